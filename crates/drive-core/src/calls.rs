@@ -473,7 +473,13 @@ impl<P: Port> Calls<'_, P> {
     /// A drive that answers that it is busy (exception 06, Modbus Application Protocol V1.1b3, section 7) has done nothing,
     /// and is asked again within the lifetime of the call, or a second where it has none; an edge is not.
     pub async fn request(&mut self, request: Request<'_>, exchange: Exchange) -> Result<Response> {
-        self.request_under(self.terms, request, exchange).await
+        // Bits and input registers judge an order as holding registers do.
+        let reads = matches!(
+            request,
+            Request::ReadCoils(..) | Request::ReadDiscreteInputs(..) | Request::ReadInputRegisters(..)
+        );
+        let terms = if reads { self.registers.patience(self.terms) } else { self.terms };
+        self.request_under(terms, request, exchange).await
     }
 
     async fn request_under(

@@ -53,6 +53,9 @@ pub struct Definition {
     pub(crate) open: &'static Open,
     pub(crate) options: &'static [OptionEntry],
     pub(crate) bits: &'static Bits,
+    pub(crate) revision: Option<&'static str>,
+    pub(crate) not_known: &'static [&'static str],
+    pub(crate) tells_itself: bool,
     #[cfg(feature = "sim")]
     pub(crate) twin: Option<Twin>,
 }
@@ -66,6 +69,9 @@ impl Definition {
             open,
             options: &[],
             bits: &|_| Vec::new(),
+            revision: None,
+            not_known: &[],
+            tells_itself: true,
             #[cfg(feature = "sim")]
             twin: None,
         }
@@ -81,6 +87,24 @@ impl Definition {
     #[must_use]
     pub const fn with_bits(self, bits: &'static Bits) -> Self {
         Self { bits, ..self }
+    }
+
+    /// The same, read from a file of this content, by a text that each content has alone.
+    #[must_use]
+    pub const fn with_revision(self, revision: &'static str) -> Self {
+        Self { revision: Some(revision), ..self }
+    }
+
+    /// The same with what nobody can know of a drive of it, in sentences for whoever commands one.
+    #[must_use]
+    pub const fn with_not_known(self, not_known: &'static [&'static str]) -> Self {
+        Self { not_known, ..self }
+    }
+
+    /// The same, of whose drives nothing tells what they are: who looks for drives takes none for one of these.
+    #[must_use]
+    pub const fn without_tell_tale(self) -> Self {
+        Self { tells_itself: false, ..self }
     }
 
     /// The same with its simulated twin, by which `sim`, `demo` and tests have such drives. With the feature `sim`.

@@ -92,6 +92,24 @@ impl Family {
         Ok(())
     }
 
+    /// The same in place of one that was added by this name, of which drives that are open go on as they are; where none was,
+    /// it is added. For families from files that are read again.
+    ///
+    /// # Errors
+    /// As for [`add`](Self::add), where one that is built in has the name.
+    pub fn exchange(self) -> Result<(), NameTaken> {
+        let key = self.capabilities().key;
+        let mut added = ADDED.write().unwrap_or_else(PoisonError::into_inner);
+        match added.iter_mut().find(|family| family.capabilities().key == key) {
+            Some(known) => *known = self,
+            None => {
+                drop(added);
+                return self.add();
+            }
+        }
+        Ok(())
+    }
+
     /// All that this program knows by name: those that are [built in](Self::BUILT_IN), then those that were added.
     #[must_use]
     pub fn all() -> Vec<Self> {
@@ -109,6 +127,24 @@ impl Family {
     #[must_use]
     pub const fn options(self) -> &'static [OptionEntry] {
         self.0.options
+    }
+
+    /// Which content of a file it was read from; `None`: it is from none. Two of one name may differ in it.
+    #[must_use]
+    pub const fn revision(self) -> Option<&'static str> {
+        self.0.revision
+    }
+
+    /// What nobody can know of a drive of it, in sentences: to be said to whoever commands one.
+    #[must_use]
+    pub const fn not_known(self) -> &'static [&'static str] {
+        self.0.not_known
+    }
+
+    /// Whether anything that its drives read to be tells them from others.
+    #[must_use]
+    pub const fn tells_itself(self) -> bool {
+        self.0.tells_itself
     }
 
     /// Whether this is the name of one of its options.
@@ -204,8 +240,10 @@ impl FromStr for Family {
     type Err = UnknownFamily;
 
     fn from_str(text: &str) -> Result<Self, UnknownFamily> {
-        let mut all = Self::all().into_iter();
-        let found = all.find(|family| family.capabilities().key.eq_ignore_ascii_case(text));
+        let is_it = |family: &&Self| family.capabilities().key.eq_ignore_ascii_case(text);
+        let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
+        let found = Self::BUILT_IN.iter().chain(&*added).find(is_it).copied();
+        drop(added);
         found.ok_or_else(|| UnknownFamily(text.to_owned()))
     }
 }

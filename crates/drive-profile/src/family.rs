@@ -61,19 +61,27 @@ pub fn definition(profile: &Arc<Profile>) -> &'static Definition {
     }));
     let of = profile.clone();
     let bits = Box::leak(Box::new(move |register| bits(&of, register)));
-    let definition = Definition::new(profile.capabilities(), open).with_options(&OPTIONS).with_bits(bits);
+    let not_known: Vec<&'static str> = profile.not_known().map(drive_core::interned::text).collect();
+    let mut definition = Definition::new(profile.capabilities(), open)
+        .with_options(&OPTIONS)
+        .with_bits(bits)
+        .with_revision(drive_core::interned::text(profile.digest()))
+        .with_not_known(drive_core::interned::list(&not_known));
+    if !profile.tells_itself() {
+        definition = definition.without_tell_tale();
+    }
     #[cfg(feature = "sim")]
     let definition = with_twin(definition, profile);
     Box::leak(Box::new(definition))
 }
 
-/// Its simulated twin, where it can have one.
+/// Its simulated twin.
 #[cfg(feature = "sim")]
 fn with_twin(definition: Definition, profile: &Arc<Profile>) -> Definition {
     use crate::machine::Machine;
     use drive_families::{SetUp, Twin};
 
-    let Some(machine) = Machine::new(profile.clone()) else { return definition };
+    let machine = Machine::new(profile.clone());
     let machines = Box::leak(Box::new(move |set_up| -> Box<dyn drive_sim::Model> {
         let machine = machine.clone();
         Box::new(if set_up == SetUp::Factory { machine.at_the_panel() } else { machine })
@@ -86,7 +94,7 @@ fn with_twin(definition: Definition, profile: &Arc<Profile>) -> Definition {
 /// The states that the bits of a register say.
 fn bits(profile: &Profile, register: u16) -> Vec<Bit> {
     let file = profile.file();
-    let states = file.state.is.iter().map(toml::Spanned::get_ref);
+    let states = file.state.is.iter().map(crate::format::Spanned::get_ref);
     let of_register = states.filter(|is| {
         let named = file.named(is.bits.get_ref().register.get_ref());
         named.and_then(|named| file.place(named)).is_some_and(|(_, address)| address == register)

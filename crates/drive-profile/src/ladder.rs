@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use toml::Spanned;
+use crate::format::Spanned;
 
 use crate::{
     format::{Action, Answer, File, Proves, Register, Space, StateName, Storage},
@@ -41,6 +41,8 @@ pub struct Gap {
     pub keeps_from: Option<Level>,
     /// The line, from 1.
     pub line: usize,
+    /// Whether it matters each time the drive is commanded: who else commands it, and what it does without this side.
+    pub matters: bool,
     /// What is not known.
     pub what: String,
     /// What would tell.
@@ -148,17 +150,20 @@ impl<'a> Ladder<'a> {
                 Answer::Given(owner) => {
                     self.sound(Level::Motion, what, &owner.get_ref().bits.source);
                     if owner.get_ref().proves == Proves::Nothing {
-                        self.say(
+                        self.warn(
                             &format!("the drive tells {what} only where it is not the bus"),
                             "see that nothing else commands it",
                         );
                     }
                 }
                 Answer::None => {
-                    self.say(&format!("the drive does not tell {what}"), "see that nothing else commands it");
+                    self.warn(
+                        &format!("the drive does not tell {what}"),
+                        "see that nothing else commands it",
+                    );
                 }
                 Answer::Unknown => {
-                    self.say(
+                    self.warn(
                         &format!("whether the drive tells {what} is not known"),
                         "which bit or register tells it?",
                     );
@@ -272,10 +277,12 @@ impl<'a> Ladder<'a> {
         let told = file.who.fingerprints.given().is_some_and(|all| {
             !all.is_empty() && all.iter().all(|of| grade(file, &of.get_ref().source).is_sound())
         });
-        let shared = file
-            .actions()
-            .flat_map(|(_, action)| file.writes(action.get_ref()))
-            .any(|written| written.space == Space::HoldingRegister && SHARED.contains(&written.address));
+        let setpoint = file.setpoint.given().and_then(|of| file.named(of.get_ref().register.get_ref()));
+        let commanded = file.actions().flat_map(|(_, action)| file.writes(action.get_ref()));
+        let shared = commanded
+            .map(|written| (written.space, written.address))
+            .chain(setpoint.and_then(|register| file.place(register)))
+            .any(|(space, address)| space == Space::HoldingRegister && SHARED.contains(&address));
         if shared && !told && !self.is_tried() {
             self.keep(
                 Level::Motion,
@@ -298,7 +305,7 @@ impl<'a> Ladder<'a> {
                         "see its setting",
                     );
                 } else if watchdog.from_factory == Answer::Given(false) {
-                    self.say("its communication watchdog is off from the factory", "set it at the drive");
+                    self.warn("its communication watchdog is off from the factory", "set it at the drive");
                 }
                 if watchdog.fed_by.is_unknown() {
                     self.say(
@@ -310,11 +317,11 @@ impl<'a> Ladder<'a> {
                     self.say("what its communication watchdog does is not known", "which value does what?");
                 }
             }
-            Answer::None => self.say(
+            Answer::None => self.warn(
                 "it has no communication watchdog: it runs on when the line is lost",
                 "wire an emergency stop",
             ),
-            Answer::Unknown => self.say(
+            Answer::Unknown => self.warn(
                 "whether it stops by itself when the line is lost is not known",
                 "does it have a communication watchdog, and how is it set?",
             ),
@@ -324,7 +331,7 @@ impl<'a> Ladder<'a> {
         if let Some(Storage::Unknown) =
             setpoint.and_then(|register| register.storage.as_ref()).map(|of| *of.get_ref())
         {
-            self.say("whether each setpoint wears an EEPROM is not known", "where does its register live?");
+            self.warn("whether each setpoint wears an EEPROM is not known", "where does its register live?");
         }
         if file.faults.present.given().is_none() {
             self.say("the code of its present fault is not known", "which register holds it?");
@@ -334,7 +341,7 @@ impl<'a> Ladder<'a> {
         if let Some(command) = file.command.given()
             && command.get_ref().acts != crate::format::Acts::Edge
         {
-            self.say(
+            self.warn(
                 "a run command that stands may start the motor when its power comes back",
                 "give it a watchdog that ends it, or switch its supply off only when it was stopped",
             );
@@ -375,16 +382,21 @@ impl<'a> Ladder<'a> {
     }
 
     fn keep(&mut self, level: Level, at: usize, what: &str, question: &str) {
-        self.gap(Some(level), at, what, question);
+        self.gap(Some(level), false, at, what, question);
     }
 
     fn say(&mut self, what: &str, question: &str) {
-        self.gap(None, 0, what, question);
+        self.gap(None, false, 0, what, question);
     }
 
-    fn gap(&mut self, keeps_from: Option<Level>, at: usize, what: &str, question: &str) {
+    /// What matters each time the drive is commanded.
+    fn warn(&mut self, what: &str, question: &str) {
+        self.gap(None, true, 0, what, question);
+    }
+
+    fn gap(&mut self, keeps_from: Option<Level>, matters: bool, at: usize, what: &str, question: &str) {
         let line = line(self.text, &(at..at));
-        let gap = Gap { keeps_from, line, what: what.to_owned(), question: question.to_owned() };
+        let gap = Gap { keeps_from, line, matters, what: what.to_owned(), question: question.to_owned() };
         if !self.gaps.contains(&gap) {
             self.gaps.push(gap);
         }

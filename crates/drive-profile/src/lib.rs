@@ -30,7 +30,10 @@ mod profile;
 pub mod shipped;
 mod source;
 
-pub use check::{LONGEST, Refusal, Refusals, read};
+#[cfg(feature = "schemars")]
+pub use format::schema;
+
+pub use check::{LONGEST, Refusal, Refusals, digest, read};
 pub use drive::{Owner, ProfileDrive};
 #[cfg(feature = "families")]
 pub use family::definition;

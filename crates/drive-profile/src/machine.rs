@@ -1,5 +1,7 @@
 //! A simulated drive from a profile: it does what the profile says, so that it proves that the profile agrees with itself, and not that it
-//! is true. Of drives whose registers are all holding registers.
+//! is true.
+
+mod bits;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -10,7 +12,7 @@ use drive_sim::{
 
 use crate::{
     drive::{Words, counts, hundredths},
-    format::{Access, Bits, Guard, Register, Space, UnitName},
+    format::{Access, Bits, Guard, Order, Register, Space, UnitName},
     profile::{Profile, Written},
 };
 
@@ -25,14 +27,17 @@ const FAST: Ramp = Ramp { full_scale: 5_000, time: Duration::from_secs(1) };
 /// What the code of a trip is on a drive that tells none.
 const NO_CODE: u16 = 1;
 
+/// Registers, coils and inputs by their places.
+type Cells = BTreeMap<(Space, u16), u16>;
+
 /// A drive of a profile as somebody beside it sees it.
 #[derive(Debug, Clone)]
 pub struct Machine {
     profile: Arc<Profile>,
     rules: Rules,
     surroundings: &'static Surroundings,
-    /// What was written, by address.
-    kept: BTreeMap<u16, u16>,
+    /// What was written, by its place.
+    kept: Cells,
     motor: Motor,
     /// The run command that is in force.
     order: Option<Direction>,
@@ -46,19 +51,9 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// One that the bus commands; `None`: it has coils or inputs, which no simulated drive here has. What is around it lives as long as
-    /// the program: clone one rather than make several.
+    /// One that the bus commands. What is around it lives as long as the program: clone one rather than make several.
     #[must_use]
-    pub fn new(profile: Arc<Profile>) -> Option<Self> {
-        let file = profile.file();
-        let place = |register: &toml::Spanned<Register>| file.place(register.get_ref());
-        if !file
-            .register
-            .values()
-            .all(|register| place(register).is_some_and(|(space, _)| space == Space::HoldingRegister))
-        {
-            return None;
-        }
+    pub fn new(profile: Arc<Profile>) -> Self {
         let claims = profile.capabilities();
         let rules = Rules {
             read_holding: claims.read_words,
@@ -76,7 +71,7 @@ impl Machine {
             rows: claims.rows,
             ..Surroundings::NONE
         };
-        Some(Self {
+        Self {
             rules,
             surroundings: Box::leak(Box::new(around)),
             kept: BTreeMap::new(),
@@ -93,7 +88,7 @@ impl Machine {
             powered: true,
             supplied: true,
             profile,
-        })
+        }
     }
 
     /// One that its panel commands.
@@ -103,10 +98,15 @@ impl Machine {
         self
     }
 
-    fn register(&self, address: u16) -> Option<&Register> {
+    /// The register of a place: also where it is the second of two words.
+    fn register(&self, (space, address): (Space, u16)) -> Option<&Register> {
         let file = self.profile.file();
-        let all = file.register.values().map(toml::Spanned::get_ref);
-        all.into_iter().find(|register| file.place(register) == Some((Space::HoldingRegister, address)))
+        let has = |register: &&Register| {
+            let Some((of, first)) = file.place(register) else { return false };
+            let second = if crate::drive::is_double(register) { first.checked_add(1) } else { None };
+            of == space && (first == address || second == Some(address))
+        };
+        file.register.values().map(crate::format::Spanned::get_ref).find(has)
     }
 
     fn ordered(&self) -> Option<Direction> {
@@ -120,8 +120,7 @@ impl Machine {
         let file = self.profile.file();
         let name = file.setpoint.given().map(|setpoint| setpoint.get_ref().register.get_ref());
         let Some(register) = name.and_then(|name| file.named(name)) else { return 0 };
-        let held =
-            file.place(register).and_then(|(_, address)| self.kept.get(&address)).copied().unwrap_or(0);
+        let held = file.place(register).and_then(|place| self.kept.get(&place)).copied().unwrap_or(0);
         hertz(register).map_or(0, |[numerator, denominator]| hundredths(held.into(), numerator, denominator))
     }
 
@@ -145,10 +144,14 @@ impl Machine {
     fn obey(&mut self, written: Written) {
         let profile = self.profile.clone();
         let file = profile.file();
-        let writes = |action: &crate::format::Answer<toml::Spanned<crate::format::Action>>| {
+        let writes = |action: &crate::format::Answer<crate::format::Spanned<crate::format::Action>>| {
             action.given().map(|action| file.writes(action.get_ref())).unwrap_or_default()
         };
-        let ends = |start| writes(start).last() == Some(&written);
+        // The last write of a start starts it, where what else it writes stands by now: a direction of its own.
+        let ends = |start| {
+            let all = writes(start);
+            all.last() == Some(&written) && all.iter().all(|of| self.stands(&all, *of))
+        };
         if ends(&file.start.forward) {
             self.order = Some(Direction::Forward);
         } else if ends(&file.start.reverse) {
@@ -167,6 +170,13 @@ impl Machine {
         if self.fault.is_some() || !self.supplied || self.local {
             self.order = None;
         }
+    }
+
+    /// Whether what an action leaves at a place stands there.
+    fn stands(&self, action: &[Written], of: Written) -> bool {
+        let place = (of.space, of.address);
+        let left = action.iter().rev().find(|other| (other.space, other.address) == place);
+        left.is_none_or(|left| self.kept.get(&place) == Some(&left.value))
     }
 
     /// The state that it shows.
@@ -189,7 +199,7 @@ impl Machine {
     }
 
     /// All its registers, as they are read now.
-    fn shown(&self) -> BTreeMap<u16, u16> {
+    fn shown(&self) -> Cells {
         let file = self.profile.file();
         let mut words = self.kept.clone();
         let output = self.motor.output_frequency();
@@ -198,6 +208,15 @@ impl Machine {
             [&file.who.guards, &file.who.fingerprints].into_iter().filter_map(|all| all.given()).flatten()
         {
             self.fulfil(&mut words, guard.get_ref());
+        }
+        for name in self.limits() {
+            if !file
+                .named(name)
+                .and_then(|register| file.place(register))
+                .is_some_and(|place| words.contains_key(&place))
+            {
+                self.put(&mut words, name, FULL_SCALE.centihertz().into());
+            }
         }
         for (name, value) in [
             (see.output.given(), i64::from(output)),
@@ -225,14 +244,23 @@ impl Machine {
         self.show_state(words, output)
     }
 
+    /// The registers that hold how fast it may turn.
+    fn limits(&self) -> impl Iterator<Item = &str> {
+        let setpoint = self.profile.file().setpoint.given().map(crate::format::Spanned::get_ref);
+        let named = setpoint.into_iter().flat_map(|of| [&of.limits.get_ref().high_in, &of.full_scale]);
+        named.flatten().map(|name| name.get_ref().as_str()).filter(|name| *name != "owner")
+    }
+
     /// The same with the bits of its state: those by which the profile reads that state, and as many of what a start waits for as
     /// say no other.
-    fn show_state(&self, words: BTreeMap<u16, u16>, output: i32) -> BTreeMap<u16, u16> {
+    fn show_state(&self, words: Cells, output: i32) -> Cells {
         let file = self.profile.file();
         let state = self.state();
-        let is_it = |words: &BTreeMap<u16, u16>| self.told(words) == state;
+        let is_it = |words: &Cells| self.told(words) == state;
         let mut best = words.clone();
-        for row in file.state.is.iter().map(toml::Spanned::get_ref).filter(|is| is.state.state() == state) {
+        for row in
+            file.state.is.iter().map(crate::format::Spanned::get_ref).filter(|is| is.state.state() == state)
+        {
             let mut tried = words.clone();
             self.set(&mut tried, row.bits.get_ref(), true);
             if state == State::Running || output != 0 {
@@ -256,8 +284,9 @@ impl Machine {
         best
     }
 
-    fn show_direction(&self, words: &mut BTreeMap<u16, u16>, output: i32) {
-        let Some(direction) = self.profile.file().see.direction.given().map(toml::Spanned::get_ref) else {
+    fn show_direction(&self, words: &mut Cells, output: i32) {
+        let Some(direction) = self.profile.file().see.direction.given().map(crate::format::Spanned::get_ref)
+        else {
             return;
         };
         let name = direction.register.get_ref();
@@ -271,18 +300,18 @@ impl Machine {
     }
 
     /// The state that these registers tell, by the profile.
-    fn told(&self, words: &BTreeMap<u16, u16>) -> State {
+    fn told(&self, words: &Cells) -> State {
         let mut read = Words::default();
-        for (&first, &word) in words {
-            read.keep(crate::drive::Block { space: Space::HoldingRegister, first, count: 1 }, [word]);
+        for (&(space, first), &word) in words {
+            read.keep(crate::drive::Block { space, first, count: 1 }, [word]);
         }
-        let states = self.profile.file().state.is.iter().map(toml::Spanned::get_ref);
+        let states = self.profile.file().state.is.iter().map(crate::format::Spanned::get_ref);
         // What was never set holds 0.
         let fits = |bits: &Bits| self.profile.fits(&read, bits).unwrap_or(bits.fit(0));
         states.into_iter().find(|is| fits(is.bits.get_ref())).map_or(State::Unknown, |is| is.state.state())
     }
 
-    fn fulfil(&self, words: &mut BTreeMap<u16, u16>, guard: &Guard) {
+    fn fulfil(&self, words: &mut Cells, guard: &Guard) {
         let free = |is_not: &Vec<u16>| (0..=u16::MAX).find(|word| !is_not.contains(word));
         let word = guard
             .is
@@ -292,7 +321,7 @@ impl Machine {
         self.put_word(words, guard.register.get_ref(), guard.mask.unwrap_or(u16::MAX), word.unwrap_or(0));
     }
 
-    fn set(&self, words: &mut BTreeMap<u16, u16>, bits: &Bits, fit: bool) {
+    fn set(&self, words: &mut Cells, bits: &Bits, fit: bool) {
         let mask = *bits.mask.get_ref();
         let other = bits.value ^ (mask & mask.wrapping_neg());
         self.put_word(
@@ -304,7 +333,7 @@ impl Machine {
     }
 
     /// Puts a value in hundredths of its unit into a register.
-    fn put(&self, words: &mut BTreeMap<u16, u16>, name: &str, value: i64) {
+    fn put(&self, words: &mut Cells, name: &str, value: i64) {
         let Some(register) = self.profile.file().named(name) else { return };
         let scale = match register.unit {
             UnitName::Ampere => register.scale.as_ref().map(|scale| *scale.get_ref()),
@@ -319,6 +348,10 @@ impl Machine {
                 .unwrap_or(0)
         });
         let count = if nearest == 0 { least } else { nearest };
+        if crate::drive::is_double(register) {
+            self.put_double(words, name, u32::try_from(count.unsigned_abs()).unwrap_or(u32::MAX), count < 0);
+            return;
+        }
         let word = if register.signed {
             i16::try_from(count).unwrap_or(i16::MAX).cast_unsigned()
         } else {
@@ -327,17 +360,31 @@ impl Machine {
         self.put_word(words, name, u16::MAX, word);
     }
 
-    /// Puts bits into a register, or into the byte that it is.
-    fn put_word(&self, words: &mut BTreeMap<u16, u16>, name: &str, mask: u16, value: u16) {
+    /// Puts a number into a register of two words.
+    fn put_double(&self, words: &mut Cells, name: &str, count: u32, is_negative: bool) {
         let file = self.profile.file();
         let Some(register) = file.named(name) else { return };
-        let Some((_, address)) = file.place(register) else { return };
+        let Some((space, first)) = file.place(register) else { return };
+        let count = if is_negative { count.wrapping_neg() } else { count };
+        let [a, b, c, d] = count.to_be_bytes();
+        let (high, low) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
+        let pair = if register.order == Some(Order::HighFirst) { [high, low] } else { [low, high] };
+        for (at, word) in (first..=first.saturating_add(1)).zip(pair) {
+            words.insert((space, at), word);
+        }
+    }
+
+    /// Puts bits into a register, or into the byte that it is.
+    fn put_word(&self, words: &mut Cells, name: &str, mask: u16, value: u16) {
+        let file = self.profile.file();
+        let Some(register) = file.named(name) else { return };
+        let Some(place) = file.place(register) else { return };
         let (mask, value) = match register.byte {
             None => (mask, value),
             Some(crate::format::Byte::Low) => (mask & 0xFF, value & 0xFF),
             Some(crate::format::Byte::High) => ((mask & 0xFF) << 8, (value & 0xFF) << 8),
         };
-        let word = words.entry(address).or_insert(0);
+        let word = words.entry(place).or_insert(0);
         *word = *word & !mask | value & mask;
     }
 }
@@ -352,6 +399,37 @@ fn hertz(register: &Register) -> Option<[i64; 2]> {
     }
 }
 
+impl Machine {
+    fn has_function(&self, function: u8) -> bool {
+        self.profile.capabilities().functions.contains(&function)
+    }
+
+    fn read_at(&self, place: (Space, u16)) -> Result<u16, Exception> {
+        let readable = self.register(place).is_some_and(|register| register.access != Access::Write);
+        if readable {
+            Ok(self.shown().get(&place).copied().unwrap_or(0))
+        } else {
+            Err(Exception::ILLEGAL_ADDRESS)
+        }
+    }
+
+    fn takes(&self, place: (Space, u16)) -> Result<(), Exception> {
+        match self.register(place).map(|register| register.access) {
+            None | Some(Access::Read) => Err(Exception::ILLEGAL_ADDRESS),
+            Some(Access::WriteStopped) if self.motor.is_fed() => Err(Exception::FAILURE),
+            Some(_) => Ok(()),
+        }
+    }
+
+    fn write_at(&mut self, written: Written) -> Result<(), Exception> {
+        self.takes((written.space, written.address))?;
+        self.kept.insert((written.space, written.address), written.value);
+        self.obey(written);
+        self.steer();
+        Ok(())
+    }
+}
+
 impl Model for Machine {
     fn rules(&self) -> &Rules {
         &self.rules
@@ -362,24 +440,21 @@ impl Model for Machine {
     }
 
     fn read(&mut self, address: u16) -> Result<u16, Exception> {
-        let readable = self.register(address).is_some_and(|register| register.access != Access::Write);
-        if readable { Ok(self.peek(address).unwrap_or(0)) } else { Err(Exception::ILLEGAL_ADDRESS) }
+        self.read_at((Space::HoldingRegister, address))
     }
 
     fn write(&mut self, address: u16, value: u16, cast: Cast) -> Result<(), Exception> {
         self.check_word(address, value, cast)?;
-        self.kept.insert(address, value);
-        self.obey(Written { space: Space::HoldingRegister, address, value });
-        self.steer();
-        Ok(())
+        self.write_at(Written { space: Space::HoldingRegister, address, value })
     }
 
     fn check_word(&self, address: u16, _: u16, _: Cast) -> Result<(), Exception> {
-        match self.register(address).map(|register| register.access) {
-            None | Some(Access::Read) => Err(Exception::ILLEGAL_ADDRESS),
-            Some(Access::WriteStopped) if self.motor.is_fed() => Err(Exception::FAILURE),
-            Some(_) => Ok(()),
-        }
+        self.takes((Space::HoldingRegister, address))
+    }
+
+    /// Coils, inputs, and the registers that only read: the functions beside those of holding registers.
+    fn other(&mut self, request: &[u8]) -> Result<Vec<u8>, Exception> {
+        bits::answer(self, request)
     }
 
     fn advance(&mut self, elapsed: Duration) {
@@ -441,14 +516,16 @@ impl Model for Machine {
     }
 
     fn peek(&self, address: u16) -> Option<u16> {
-        self.register(address)?;
-        Some(self.shown().get(&address).copied().unwrap_or(0))
+        let place = (Space::HoldingRegister, address);
+        self.register(place)?;
+        Some(self.shown().get(&place).copied().unwrap_or(0))
     }
 
     fn poke(&mut self, address: u16, value: u16) -> bool {
-        let writable = self.register(address).is_some_and(|register| register.access != Access::Read);
+        let place = (Space::HoldingRegister, address);
+        let writable = self.register(place).is_some_and(|register| register.access != Access::Read);
         if writable {
-            self.kept.insert(address, value);
+            self.kept.insert(place, value);
             self.steer();
         }
         writable

@@ -1,7 +1,7 @@
 //! A profile that was checked: [`Profile`].
 
 use crate::{
-    format::{Action, Answer, File, Register, Space, Step},
+    format::{Action, Answer, File, Guard, Register, Space, Step},
     ladder::{Gap, Level},
 };
 
@@ -22,6 +22,7 @@ pub struct Profile {
     pub(crate) file: File,
     pub(crate) level: Level,
     pub(crate) gaps: Vec<Gap>,
+    pub(crate) digest: String,
 }
 
 /// One register or coil of a write.
@@ -52,6 +53,12 @@ impl Profile {
         &self.file
     }
 
+    /// The SHA-256 of its text, in hexadecimal digits: two profiles of one digest are one.
+    #[must_use]
+    pub fn digest(&self) -> &str {
+        &self.digest
+    }
+
     /// What the drive can be trusted with by this profile.
     #[must_use]
     pub const fn level(&self) -> Level {
@@ -62,6 +69,35 @@ impl Profile {
     #[must_use]
     pub fn gaps(&self) -> &[Gap] {
         &self.gaps
+    }
+
+    /// What keeps its drive from a level, in words for whoever has asked for more; `None`: it reaches it.
+    #[must_use]
+    pub fn keeps_from(&self, level: Level) -> Option<String> {
+        (self.level < level).then(|| {
+            let gap = self.gaps.iter().find(|gap| gap.keeps_from.is_some_and(|of| of <= level));
+            let because = gap.map(|gap| format!(": {}, line {}", gap.what, gap.line)).unwrap_or_default();
+            format!("its profile reaches {} and no further{because}", self.level)
+        })
+    }
+
+    /// What cannot be seen of its drive and matters to whoever starts it, gives it a setpoint or resets it.
+    pub fn not_known(&self) -> impl Iterator<Item = &str> {
+        self.gaps.iter().filter(|gap| gap.matters).map(|gap| gap.what.as_str())
+    }
+
+    /// By what its drive says what it is, the same each time; `None`: by nothing.
+    pub(crate) fn identification(&self) -> Option<&'static str> {
+        let all = self.file.who.fingerprints.given().into_iter().flatten();
+        let is_constant =
+            |of: &crate::format::Spanned<Guard>| of.get_ref().is.as_ref().is_some_and(|is| is.len() == 1);
+        all.into_iter().any(is_constant).then_some("registers that only this drive reads so")
+    }
+
+    /// Whether anything that its drive reads to be tells it from others.
+    #[must_use]
+    pub fn tells_itself(&self) -> bool {
+        self.file.who.fingerprints.given().is_some_and(|all| !all.is_empty())
     }
 }
 
@@ -74,7 +110,7 @@ impl File {
 
     /// A register by its name.
     pub(crate) fn named(&self, name: &str) -> Option<&Register> {
-        self.register.get(name).map(toml::Spanned::get_ref)
+        self.register.get(name).map(crate::format::Spanned::get_ref)
     }
 
     /// What an action writes, in its order, register by register.
@@ -95,7 +131,7 @@ impl File {
     }
 
     /// Every action with its name.
-    pub(crate) fn actions(&self) -> impl Iterator<Item = (&'static str, &toml::Spanned<Action>)> {
+    pub(crate) fn actions(&self) -> impl Iterator<Item = (&'static str, &crate::format::Spanned<Action>)> {
         let all: [(&'static str, &Answer<_>); 8] = [
             ("stop.ramp", &self.stop.ramp),
             ("stop.fast", &self.stop.fast),

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use toml::Spanned;
+use crate::format::Spanned;
 
 use crate::format::{File, Mark};
 

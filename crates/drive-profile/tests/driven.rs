@@ -13,8 +13,9 @@ use drive_testing::{
     worlds::{Configuration, Event, Share, Surrounded},
 };
 
-/// Those that reach motion and whose registers are all holding registers.
-const DRIVEN: [&str; 5] = ["danfoss-fc", "goodrive", "ig5a", "v20", "danfoss-fc51"];
+/// Those that reach motion and show the setpoint that they hold: of the VF-S15 a setpoint is not confirmed before it is started.
+const DRIVEN: [&str; 8] =
+    ["danfoss-fc", "goodrive", "ig5a", "v20", "danfoss-fc51", "altivar", "wj200", "mx2"];
 
 fn family(key: &str) -> Family {
     family_of(shipped::find(key).expect("it is shipped").clone())
@@ -46,8 +47,14 @@ async fn running(key: &str) -> Rig {
         .await
         .unwrap_or_else(|error| panic!("{key}: {error}"));
     rig.drive.start(Direction::Forward).await.unwrap_or_else(|error| panic!("{key}: {error}"));
-    rig.until_at(Frequency::from_hertz(30)).await;
+    rig.until_machine("the output is that of the setpoint", |machine| machine.output_frequency == 3_000)
+        .await;
     rig
+}
+
+/// Whether a request only reads: functions 1 to 4.
+fn is_read(request: &drive_sim::Received) -> bool {
+    matches!(request.pdu.first(), Some(1..=4))
 }
 
 /// What [`Contract`] asks of every family but for one thing: a drive that does not tell who commands it is told in force by no status.
@@ -61,7 +68,10 @@ async fn each_keeps_the_contract_of_a_family_at_its_level() {
         contract.does_what_it_claims().await;
         contract.has_the_watchdog_that_it_claims().await;
         contract.takes_the_exchanges_that_it_claims().await;
-        contract.lives_the_story().await;
+        // How an Altivar is turned round by these profiles is not known, and the story turns every drive round.
+        if key != "altivar" {
+            contract.lives_the_story().await;
+        }
     }
 }
 
@@ -78,6 +88,64 @@ async fn no_disobedient_drive_and_no_lost_answer_makes_one_say_what_is_not_so() 
         let lies: Vec<String> = lies.collect();
         assert!(lies.is_empty(), "{key}:\n{}", lies.join("\n"));
     }
+}
+
+/// Coils: started, turned round through standstill, stopped, tripped, reset and lost, by what the machine does.
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_is_commanded_by_coils_is_driven_as_those_are_that_have_words() {
+    for key in ["wj200", "mx2"] {
+        let mut rig = running(key).await;
+        assert_eq!(rig.machine.observe().output_frequency, 3_000, "{key}");
+        let status =
+            rig.drive.start(Direction::Reverse).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        assert_eq!((status.state, status.verdict), (State::Running, Some(Verdict::NotKnown)), "{key}");
+        rig.until_machine("it turns round", |machine| machine.output_frequency == -3_000).await;
+        let stopped = rig.drive.stop(StopMode::Ramp).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        assert_eq!((stopped.mode, rig.drive.lease()), (StopMode::Ramp, None), "{key}");
+        rig.until_machine("it stands", |machine| machine.shaft_frequency == 0).await;
+        rig.drive.start(Direction::Forward).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        rig.machine.trip(9);
+        rig.until("the trip", |status| status.state == State::Fault).await;
+        rig.drive.reset_faults().await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        rig.poll_for(Duration::from_secs(3)).await;
+        assert!(!rig.machine.observe().running, "{key}: a reset is no start");
+        rig.drive.start(Direction::Forward).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        rig.machine.mute();
+        let lost = rig.drive.status().await.expect_err("nobody answers");
+        assert_eq!(lost.kind(), ErrorKind::NoAnswer, "{key}");
+        rig.machine.unmute();
+        rig.drive.forget();
+        rig.poll_for(Duration::from_secs(12)).await;
+        rig.drive.status().await.expect("it answers again");
+        assert!(rig.drive.lease().is_some(), "{key}: it may stand, and nothing has shown that it does not");
+        rig.drive.stop(StopMode::Ramp).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+    }
+}
+
+/// Run command, direction and reset in registers of their own, its state in a register that is only read, its output in two words: whoever
+/// tells all of it is told in force.
+#[tokio::test(start_paused = true)]
+async fn a_drive_of_split_registers_is_turned_round_and_its_run_command_is_in_force() {
+    let profile = read(include_str!("data/split.toml")).unwrap_or_else(|refusals| panic!("{refusals}"));
+    assert_eq!(profile.level(), Level::Motion, "{:#?}", profile.gaps());
+    let family = family_of(profile);
+    let contract = contract(family, family.simulated_options());
+    contract.does_what_it_claims().await;
+    contract.takes_the_exchanges_that_it_claims().await;
+    contract.lives_the_story().await;
+    let mut rig = contract.rig();
+    rig.drive.status().await.expect("it answers");
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    for (direction, output) in [(Direction::Forward, 3_000), (Direction::Reverse, -3_000)] {
+        rig.drive.start(direction).await.expect("it starts");
+        rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == output).await;
+        let status = rig.drive.status().await.expect("it answers");
+        assert_eq!(status.output_frequency, Some(Frequency::from_hertz(30)), "two words");
+        assert_eq!(status.verdict, Some(Verdict::InForce), "{direction}");
+    }
+    rig.machine.written_by_another(0x091B, 0).expect("it takes it");
+    let status = rig.until("another has stopped it", |status| status.state != State::Running).await;
+    assert!(!matches!(status.verdict, Some(Verdict::InForce)), "{:?}", status.verdict);
 }
 
 #[tokio::test(start_paused = true)]
@@ -149,8 +217,7 @@ async fn neither_a_lost_line_nor_a_power_cycle_makes_it_write_anything() {
         let before = rig.machine.received().len();
         rig.drive.forget();
         rig.poll_for(Duration::from_secs(5)).await;
-        let written =
-            rig.machine.received().iter().skip(before).any(|request| request.pdu.first() != Some(&3));
+        let written = rig.machine.received().iter().skip(before).any(|request| !is_read(request));
         assert!(!written && !rig.machine.observe().running, "{key}");
         assert!(
             rig.drive.lease().is_some(),

@@ -14,7 +14,9 @@ pub(crate) const EXCEPTION: u8 = 0x80;
 /// Answers everything but the functions that the slave itself counts for (08 and 0Bh).
 pub(crate) fn answer(model: &mut dyn Model, request: &[u8], cast: Cast) -> Result<Vec<u8>, Exception> {
     match *request {
-        [function @ (READ_HOLDING | READ_INPUT), a, b, c, d] => {
+        [function @ (READ_HOLDING | READ_INPUT), a, b, c, d]
+            if function == READ_HOLDING || model.rules().read_input > 0 =>
+        {
             let (first, quantity) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
             read(model, Block { function, first, quantity })
         }

@@ -18,9 +18,9 @@ pub struct Heard {
     pub terms: Terms,
     /// Its function code.
     pub function: u8,
-    /// Its first register, where it has one.
+    /// Its first register, coil or input, where it has one.
     pub register: Option<u16>,
-    /// The words that it writes; empty for what only reads.
+    /// The words that it writes, of a coil 1 for on and 0 for off; empty for what only reads.
     pub words: Vec<u16>,
 }
 
@@ -32,6 +32,11 @@ impl Heard {
             Request::ReadHoldingRegisters(register, _) | Request::ReadInputRegisters(register, _) => {
                 (Some(*register), Vec::new())
             }
+            Request::WriteSingleCoil(coil, on) => (Some(*coil), vec![u16::from(*on)]),
+            Request::WriteMultipleCoils(coil, coils) => {
+                (Some(*coil), coils.iter().map(|on| u16::from(*on)).collect())
+            }
+            Request::ReadCoils(coil, _) | Request::ReadDiscreteInputs(coil, _) => (Some(*coil), Vec::new()),
             _ => (None, Vec::new()),
         };
         Self { terms, function: request.function_code().value(), register, words }
@@ -161,6 +166,10 @@ impl<P: Port> Client for Recorder<P> {
             }
             Request::WriteMultipleRegisters(register, words) => {
                 Some(Response::WriteMultipleRegisters(*register, words.len() as u16))
+            }
+            Request::WriteSingleCoil(coil, on) => Some(Response::WriteSingleCoil(*coil, *on)),
+            Request::WriteMultipleCoils(coil, coils) => {
+                Some(Response::WriteMultipleCoils(*coil, coils.len() as u16))
             }
             _ => None,
         };

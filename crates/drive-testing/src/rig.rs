@@ -104,8 +104,9 @@ impl Rig {
 
     /// Polls until the output has this frequency and the drive says that it is its reference.
     pub async fn until_at(&mut self, frequency: Frequency) -> Status {
-        self.until("the reference is reached", |status| {
-            status.output_frequency == Some(frequency) && status.at_reference != Some(false)
+        self.until("the reference is reached", |status| match status.output_frequency {
+            Some(output) => output == frequency && status.at_reference != Some(false),
+            None => status.reference == Some(frequency) && status.at_reference == Some(true),
         })
         .await
     }

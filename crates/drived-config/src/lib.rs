@@ -1,5 +1,5 @@
 //! What holds at `drived` before a drive is spoken to: what a configuration is made of ([`config`]), who may do what
-//! ([`rights`]), and what is kept in files ([`kept`]), such as the records of each drive ([`records`]) and its number
+//! ([`rights`]), the drives that come from files ([`profiles`]), and what is kept in files ([`kept`]), such as the records of each drive ([`records`]) and its number
 //! ([`names`]).
 
 #![forbid(unsafe_code)]
@@ -13,6 +13,7 @@
 pub mod config;
 pub mod kept;
 pub mod names;
+pub mod profiles;
 pub mod records;
 pub mod rights;
 #[cfg(any(test, feature = "testing"))]

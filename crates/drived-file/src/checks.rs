@@ -11,7 +11,10 @@ use std::{
 use drive_bus::Endpoint;
 
 use super::file;
-use drived_config::config::{ConfigError, Entry as _, LinePart, Source};
+use drived_config::{
+    config::{ConfigError, Entry as _, LinePart, Source, of},
+    profiles::Folder,
+};
 
 /// A configuration that is longer is no configuration.
 const LONGEST_FILE: u64 = 1 << 20;
@@ -29,6 +32,18 @@ pub(super) fn read_file(path: &Path) -> Result<String, String> {
         0 => Err(format!("it is longer than {} KiB: expected a configuration", LONGEST_FILE >> 10)),
         _ => Ok(text),
     }
+}
+
+/// A drive whose profile has been taken out of the folder is one of which nothing is known, whatever this process has read before.
+pub(super) fn profiles(source: Source<'_>, raw: &file::File, folder: &Folder) -> Result<(), ConfigError> {
+    let drives = of(&raw.drives).into_iter().flatten().filter_map(|entry| entry.get_ref().drive.as_ref());
+    for drive in drives {
+        if let Some(gone) = drive.get_ref().0.names().find(|name| !folder.has(name.family)) {
+            let problem = format_args!("no profile in the folder says any more what {} is", gone.family);
+            return Err(source.error(drive.span(), problem));
+        }
+    }
+    Ok(())
 }
 
 /// Two lines over one port would talk into each other. A gateway for Modbus TCP keeps its connections apart, but not two

@@ -49,6 +49,8 @@ settings! {
     /// next run if this one is killed
     watchdogs: PathBuf = "`watchdogs.json` in the state folder",
         |to, said| to.kept.watchdogs = Some(said.clone());
+    /// a folder of [profiles](#drives-from-files), for drives that are not built in; beside the configuration unless the path is whole
+    profiles: PathBuf = "those that are shipped";
     /// the lines, each with a name
     lines as "[lines.NAME]": LineEntries = "one must be given";
     /// the drives

@@ -18,13 +18,17 @@ pub mod ledger;
 use std::{collections::BTreeMap, path::Path, time::Duration};
 
 use serde::Deserialize as _;
-use toml::de::{DeTable, Deserializer};
+use toml::{
+    Spanned,
+    de::{DeTable, Deserializer},
+};
 
 use self::file::File;
 use drived_config::config::{
     ConfigError, DriveEntry, Entry as _, Environment, Group, Key, LineEntries, LineEntry, LinePart, Members,
     Source, State, groups, line_part, look_alikes, of,
 };
+use drived_config::profiles::Folder;
 use drived_doors::config::DoorsConfig;
 use drived_face::{Configured, Site, Written};
 use drived_words::failure::Failure;
@@ -86,6 +90,8 @@ impl Config {
             written.push((face, of_face.map(|value| Written::new(source, value))));
         }
         file::not_built_in(source, tables.get_ref())?;
+        // The names of drives are read by it.
+        let profiles = profiles_of(source, &tables)?;
         let raw = File::deserialize(Deserializer::from(tables)).map_err(wrong)?;
         let mut said = file::Draft::default();
         raw.set(source, &mut said)?;
@@ -98,6 +104,7 @@ impl Config {
             of(&raw.drives).map_or(&[], Vec::as_slice),
             of(&raw.defaults),
         )?;
+        checks::profiles(source, &raw, &profiles)?;
         let mut lines = Vec::new();
         for (name, entry) in raw.lines() {
             lines.push(line_part(source, name.get_ref(), name.span(), entry, &members)?);
@@ -162,6 +169,15 @@ impl Config {
             None => Ok(self),
         }
     }
+}
+
+/// The drives from files that the configuration may name.
+fn profiles_of(source: Source<'_>, tables: &Spanned<DeTable<'_>>) -> Result<Folder, ConfigError> {
+    let Some((key, value)) = tables.get_ref().get_key_value("profiles") else { return Ok(Folder::default()) };
+    // What is no text is refused with the other keys.
+    let Some(folder) = value.get_ref().as_str() else { return Ok(Folder::default()) };
+    let folder = source.file.parent().unwrap_or(Path::new("")).join(folder);
+    Folder::read(&folder).map_err(|error| source.error(key.span(), error))
 }
 
 #[cfg(test)]

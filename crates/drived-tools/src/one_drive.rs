@@ -53,7 +53,13 @@ impl OneDriveArgs {
     pub async fn tell(&self, name: Option<&str>, told: &Told) -> Result<(), Failure> {
         let name = name.ok_or_else(unnamed)?;
         let mut daemon = self.daemon.connect().await?;
-        let target = Target::find(&daemon.state().await?, name)?;
+        let state = daemon.state().await?;
+        let target = Target::find(&state, name)?;
+        let commanded = state.drives.iter().filter(|drive| target.has(&state, drive.name()));
+        for (drive, said) in commanded.flat_map(|drive| drive.not_known.iter().map(move |said| (drive, said)))
+        {
+            output::complain(format_args!("{}: {said}", drive.name()));
+        }
         client::order(&self.daemon, daemon, &target, told).await
     }
 
@@ -89,6 +95,7 @@ impl OneDriveArgs {
     pub async fn command(&self, accepted: Vec<String>) -> Result<Commanded, Failure> {
         let (name, options, config) = self.parts()?;
         let line = open_line_of(Some(name), config.clone()).await?;
+        name.family.not_known().iter().for_each(|said| output::complain(format_args!("{name}: {said}")));
         Ok(self.telling(Commanded::over(name, line, config, &options, accepted)?))
     }
 

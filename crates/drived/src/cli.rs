@@ -23,6 +23,7 @@ use drived_words::{failure::Failure, output};
 const NOTES: &str = "\
 To try it:          demo; or sim in one terminal and poll, status, start in another
 Before wiring:      families, plan
+A drive from a file: profile list, show, check, new, try
 A drive, read:      status, faults, param get, param dump
 A drive, write:     setpoint, start, stop, reset, release, param set, param save
 The running daemon: all these without --line and with the names of its drives; alarms, watch, monitor, reload
@@ -39,7 +40,8 @@ unitelway. A drive is FAMILY@ADDRESS, drives are FAMILY@ADDRESSES, such as atv31
 
 Exit codes: 0 done and confirmed, 1 a drive did not answer or did not do it, 2 bad input or a plan that cannot work.
 
-Environment: DRIVED_LOG says how much is logged, such as debug or drive_bus=trace,warn; NO_COLOR=1 switches colours off.";
+Environment: DRIVED_LOG says how much is logged, such as debug or drive_bus=trace,warn; DRIVED_PROFILES names a folder \
+of profiles; NO_COLOR=1 switches colours off.";
 
 /// Variable-speed drives over Modbus: watch, start and stop them, or try it all on simulated ones
 #[derive(Debug, Parser)]
@@ -73,6 +75,8 @@ pub(crate) enum Command {
     #[command(subcommand)]
     Param(param::Command),
     Families(families::Args),
+    #[command(subcommand)]
+    Profile(drived_profile::Command),
     Report(report::Args),
     Export(export::Args),
     Completions(completions::Args),
@@ -128,6 +132,7 @@ impl Command {
             Self::Release(args) => release::run(args).await,
             Self::Param(command) => param::run(command).await,
             Self::Families(args) => families::run(&args),
+            Self::Profile(command) => drived_profile::run(command).await,
             Self::Report(args) => report::run(args).await,
             Self::Export(args) => export::run(&args, Cli::command()),
             Self::Completions(args) => completions::run(args, Cli::command()).await,
@@ -223,6 +228,8 @@ mod tests {
             ("replay", "it serves a pty until it is ended"),
             ("export", "it prints or writes files, each in the form that its reader asks for"),
             ("completions", "a shell reads it"),
+            ("profile new", "it writes a file for a person to fill in"),
+            ("profile try", "it is a talk with the person at the drive"),
         ];
         for (words, command) in all() {
             let has = command.get_arguments().any(|argument| argument.get_long() == Some("json"));
@@ -236,6 +243,6 @@ mod tests {
         for (code, meaning) in EXIT_CODES {
             assert!(NOTES.contains(&format!("{code} {meaning}")), "{code}");
         }
-        assert!(ENVIRONMENT.iter().take(2).all(|(name, _)| NOTES.contains(name)));
+        assert!(ENVIRONMENT.iter().take(3).all(|(name, _)| NOTES.contains(name)));
     }
 }

@@ -29,6 +29,7 @@ mod refused;
 use std::process::ExitCode;
 
 use clap::Parser;
+use drived_config::profiles;
 use drived_words::{failure::Failure, logging, output};
 
 /// The program: reads the command line of this process, does what it says, and gives the exit code.
@@ -36,6 +37,13 @@ pub fn program() -> ExitCode {
     output::choose_form(std::env::args_os());
     if let Err(taken) = faces::add() {
         return cli::end(Err(Failure::Input(taken.to_string())));
+    }
+    if let Err(taken) = profiles::ship() {
+        return cli::end(Err(Failure::Input(taken.to_string())));
+    }
+    // What is wrong with a file there keeps nobody from stopping another drive.
+    if let Err(wrong) = profiles::of_environment() {
+        output::complain(format_args!("{}: {wrong}", profiles::ENVIRONMENT));
     }
     let cli = match cli::Cli::try_parse() {
         Ok(cli) => cli,

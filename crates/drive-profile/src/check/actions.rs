@@ -1,6 +1,6 @@
 //! Actions: a stop that is one write and runs nothing, a start that runs, a reset that does neither.
 
-use toml::Spanned;
+use crate::format::Spanned;
 
 use super::Check;
 use crate::{
@@ -38,6 +38,7 @@ impl Check<'_> {
         if let Some(reset) = file.reset.given() {
             self.reset(reset);
         }
+        self.setup();
         let unread = &file.stop.unread;
         let has_stops = file.actions().any(|(name, _)| name.starts_with("stop."));
         if has_stops && file.stop.of(*unread.get_ref()).given().is_none() {
@@ -169,7 +170,7 @@ impl Check<'_> {
                 "seen = [\"ready\", ...], the states in which no run command acts",
             );
         }
-        let seen = action.get_ref().seen.iter().flat_map(toml::Spanned::get_ref);
+        let seen = action.get_ref().seen.iter().flat_map(crate::format::Spanned::get_ref);
         if seen.clone().any(|state| *state == crate::format::StateName::Running) {
             self.refuse(
                 &action.span(),
@@ -225,6 +226,24 @@ impl Check<'_> {
     }
 
     /// An edge is cleared: by the drive, or by a word that stops.
+    /// What makes guards true is a setting. A command among them stops or starts a motor that somebody else drives.
+    fn setup(&mut self) {
+        let Some(setup) = self.file.setup.given() else { return };
+        let commands: Vec<_> =
+            self.file.command.given().into_iter().flat_map(|of| &of.get_ref().runs).collect();
+        let is_command = |name: &Spanned<String>| {
+            commands.iter().any(|run| run.get_ref().register.get_ref() == name.get_ref())
+        };
+        let written = setup.get_ref().steps.iter().filter_map(|step| step.get_ref().write.as_ref());
+        if let Some(name) = written.into_iter().find(|name| is_command(name)) {
+            self.refuse(
+                &name.span(),
+                format!("setup writes {}, which commands the motor", name.get_ref()),
+                "settings alone: a command belongs to stop, start or reset",
+            );
+        }
+    }
+
     fn reset(&mut self, reset: &Spanned<Action>) {
         let file = self.file;
         let action = reset.get_ref();

@@ -9,7 +9,8 @@ mod who;
 
 use std::{fmt, ops::Range};
 
-use toml::Spanned;
+use crate::format::Spanned;
+use sha2::{Digest as _, Sha256};
 
 use crate::{
     format::{File, Register, VERSION},
@@ -85,12 +86,18 @@ pub fn read(text: &str) -> Result<Profile, Refusals> {
     let mut refusals = check.refusals;
     if refusals.is_empty() {
         let (level, gaps) = ladder::climb(text, &file);
-        return Ok(Profile { file, level, gaps });
+        return Ok(Profile { file, level, gaps, digest: digest(text) });
     }
     refusals.sort_by_key(|refusal| refusal.line);
     refusals.dedup();
     refusals.truncate(TOLD);
     Err(Refusals(refusals))
+}
+
+/// The SHA-256 of a text, in hexadecimal digits: what its profile is known by.
+#[must_use]
+pub fn digest(text: &str) -> String {
+    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A file under check.

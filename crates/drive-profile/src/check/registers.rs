@@ -1,6 +1,6 @@
 //! Registers: addresses, spaces, scales, and what may not be written.
 
-use toml::Spanned;
+use crate::format::Spanned;
 
 use super::Check;
 use crate::format::{Access, Register, Storage, UnitName};

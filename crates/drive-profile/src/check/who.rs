@@ -1,6 +1,6 @@
 //! Guards, fingerprints, and every other place that names a register.
 
-use toml::Spanned;
+use crate::format::Spanned;
 
 use super::Check;
 use crate::format::{Access, Answer, Bits, Guard};

@@ -42,7 +42,7 @@ impl<P: Port> ProfileDrive<P> {
             Direction::Forward => &start.forward,
             Direction::Reverse => &start.reverse,
         };
-        let Some(action) = action.given().map(toml::Spanned::get_ref) else {
+        let Some(action) = action.given().map(crate::format::Spanned::get_ref) else {
             return Err(Error::Unsupported {
                 what: "a start in this direction",
                 reason: "its profile does not say how",
@@ -88,7 +88,7 @@ impl<P: Port> ProfileDrive<P> {
             let (status, words) = self.read_status(Class::Command).await?;
             let rung = rungs
                 .iter()
-                .map(toml::Spanned::get_ref)
+                .map(crate::format::Spanned::get_ref)
                 .find(|rung| profile.fits(&words, &rung.bits) == Some(true));
             let Some(rung) = rung else { return Err(self.refused(order, Refusal::State(status.state))) };
             match (rung.deed, &rung.register, rung.word) {
@@ -147,7 +147,9 @@ impl<P: Port> ProfileDrive<P> {
         }
         let profile = self.profile.clone();
         let (mode, instead) = self.substitute(&profile, asked);
-        let Some(action) = profile.file().stop.of(mode_name(mode)).given().map(toml::Spanned::get_ref) else {
+        let Some(action) =
+            profile.file().stop.of(mode_name(mode)).given().map(crate::format::Spanned::get_ref)
+        else {
             return Err(Error::Unsupported { what: "a stop", reason: "its profile has none" });
         };
         let order = Order::Stop(asked);
@@ -167,7 +169,7 @@ impl<P: Port> ProfileDrive<P> {
             let seen = action
                 .seen
                 .iter()
-                .flat_map(toml::Spanned::get_ref)
+                .flat_map(crate::format::Spanned::get_ref)
                 .any(|state| state.state() == status.state);
             let falls = comes_down(&status, first);
             if seen || falls {
@@ -257,7 +259,7 @@ impl<P: Port> ProfileDrive<P> {
         if !status.is_fault() {
             return Ok(status);
         }
-        let Some(reset) = profile.file().reset.given().map(toml::Spanned::get_ref) else {
+        let Some(reset) = profile.file().reset.given().map(crate::format::Spanned::get_ref) else {
             return Err(Error::Unsupported {
                 what: "a reset",
                 reason: "its profile does not say how: reset it at the drive",

@@ -1,8 +1,9 @@
 //! The drive as every family is one: [`Drive`] over what the other modules do.
 
 use drive_core::{
-    Class, Command, Direction, Drive, Error, Faults, Lease, Measurements, Port, Recognised, Refusal, Result,
-    Row, Setpoint, Status, StopMode, Stopped, Withdrawn, Written, async_trait, registers::refuse_commands,
+    Class, Command, Direction, Drive, Error, Faults, Identity, Lease, Measurements, Port, Recognised,
+    Refusal, Result, Row, Setpoint, Status, StopMode, Stopped, Withdrawn, Written, async_trait,
+    registers::refuse_commands,
 };
 
 use super::ProfileDrive;
@@ -35,7 +36,20 @@ impl<P: Port> Drive for ProfileDrive<P> {
     fn recognise(&self, _: &drive_core::Identity) -> Recognised {
         match self.guarded.otherwise.filter(|_| !self.guarded.hold) {
             Some(it_is) => Recognised::NotMine { it_is },
+            // Another maker's drive may read so too: it is likely, and no more.
             None => Recognised::CannotTell,
+        }
+    }
+
+    /// The words of its fingerprints, of a drive that has any of one value. Its guards are read in any case.
+    async fn identify(&mut self) -> Result<Identity> {
+        let identity = self.read_fingerprints().await?;
+        match self.profile.identification() {
+            Some(_) => Ok(identity),
+            None => Err(Error::Unsupported {
+                what: "identification",
+                reason: "its profile knows no register that holds one value in this drive alone",
+            }),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Guards and fingerprints: what has to read so before anything but a stop is written.
 
-use drive_core::{Class, Command, Error, Port, Refusal, Result, interned};
+use drive_core::{Class, Command, Error, Identity, Port, RawWord, Refusal, Result, interned};
 
 use super::{ProfileDrive, Words};
 use crate::{format::Guard, profile::Profile};
@@ -32,7 +32,7 @@ impl Guarded {
 fn all(profile: &Profile) -> impl Iterator<Item = &Guard> {
     let who = &profile.file().who;
     let lists = [&who.fingerprints, &who.guards].into_iter().filter_map(|list| list.given());
-    lists.flatten().map(toml::Spanned::get_ref)
+    lists.flatten().map(crate::format::Spanned::get_ref)
 }
 
 fn holds(guard: &Guard, word: u16) -> bool {
@@ -42,11 +42,39 @@ fn holds(guard: &Guard, word: u16) -> bool {
 }
 
 impl<P: Port> ProfileDrive<P> {
+    /// Reads the guards anew, and gives the words of the fingerprints that have one value: they are the same each time it is asked.
+    pub(super) async fn read_fingerprints(&mut self) -> Result<Identity> {
+        self.guarded.hold = false;
+        let words = self.read_guards(Class::Background).await?;
+        let profile = self.profile.clone();
+        let told = profile
+            .file()
+            .who
+            .fingerprints
+            .given()
+            .into_iter()
+            .flatten()
+            .map(crate::format::Spanned::get_ref);
+        let constant = told.filter(|guard| guard.is.as_ref().is_some_and(|is| is.len() == 1));
+        let code = |guard: &Guard| {
+            let name = guard.register.get_ref();
+            let register = profile.file().named(name)?;
+            let (_, address) = profile.file().place(register)?;
+            let value = profile.word(&words, name)? & guard.mask.unwrap_or(u16::MAX);
+            Some(RawWord { address, code: interned::text(name), value })
+        };
+        Ok(Identity { codes: constant.filter_map(code).collect(), ..Identity::default() })
+    }
+
     /// Reads the guards, unless they were read since the last reconnect.
     pub(super) async fn see_guards(&mut self, class: Class) -> Result<()> {
-        if self.guarded.hold {
-            return Ok(());
+        if !self.guarded.hold {
+            self.read_guards(class).await?;
         }
+        Ok(())
+    }
+
+    async fn read_guards(&mut self, class: Class) -> Result<Words> {
         let profile = self.profile.clone();
         let names = all(&profile).map(|guard| guard.register.get_ref().as_str()).collect();
         let mut words = Words::default();
@@ -67,7 +95,7 @@ impl<P: Port> ProfileDrive<P> {
         if self.guarded.otherwise.is_none() {
             (self.guarded.hold, self.guarded.have_held) = (true, true);
         }
-        Ok(())
+        Ok(words)
     }
 
     /// Before anything but a stop is written.

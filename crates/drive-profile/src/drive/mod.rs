@@ -11,13 +11,13 @@ mod tables;
 
 use std::sync::Arc;
 
-use drive_core::{Error, ExceptionMeaning, Port, Refusal, Registers, SlaveAddress, Status, Watch};
+use drive_core::{Error, ExceptionMeaning, Port, Refusal, Registers, SlaveAddress, Status, Watch, interned};
 
 pub use owner::Owner;
 
 use crate::{ladder::Level, profile::Profile};
 use guards::Guarded;
-pub(crate) use plan::{Block, Words, counts, hundredths};
+pub(crate) use plan::{Block, Words, counts, hundredths, is_double};
 
 /// A drive of a profile behind a port. See [`Drive`](drive_core::Drive) for what its methods promise; what its profile does not let
 /// them do is `Unsupported`, and says why.
@@ -49,13 +49,10 @@ impl<P: Port> ProfileDrive<P> {
 
     /// What the profile does not let be done.
     fn allow(&self, level: Level, what: &'static str) -> Result<(), Error> {
-        if self.profile.level() < level {
-            return Err(Error::Unsupported {
-                what,
-                reason: "its profile does not reach so far: see its gaps",
-            });
+        match self.profile.keeps_from(level) {
+            Some(why) => Err(Error::Unsupported { what, reason: interned::text(&why) }),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     const fn refused(&self, command: drive_core::Command, reason: Refusal) -> Error {

@@ -2,12 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use toml::Spanned;
+use crate::format::Spanned;
 
 use crate::{
-    format::{Access, Answer, Bits, Byte, Register, Space, UnitName},
+    format::{Access, Answer, Bits, Byte, Order, Register, Space, UnitName},
     profile::Profile,
 };
+
+/// The most decimals that a register can say another has.
+const DECIMALS: u16 = 6;
 
 /// Registers that one exchange reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,11 +63,14 @@ impl Profile {
         })
     }
 
-    /// The number of counts that a register holds. What has its decimals elsewhere is not told.
+    /// The number of counts that a register holds, of one word or of two.
     pub(crate) fn counts(&self, words: &Words, name: &str) -> Option<i64> {
-        let register = self.file.named(name)?;
-        if register.decimals_in.is_some() {
-            return None;
+        let (register, space, address) = self.place_of(name)?;
+        if is_double(register) {
+            let pair = [words.at(space, address)?, words.at(space, address.checked_add(1)?)?];
+            let [high, low] = if register.order? == Order::HighFirst { pair } else { [pair[1], pair[0]] };
+            let double = u32::from(high) << 16 | u32::from(low);
+            return Some(if register.signed { double.cast_signed().into() } else { double.into() });
         }
         let word = self.word(words, name)?;
         Some(if register.signed { i64::from(word.cast_signed()) } else { i64::from(word) })
@@ -73,8 +79,16 @@ impl Profile {
     /// The value of a register in hundredths of a unit, rounded; `None` where it has another unit, or was not read.
     pub(crate) fn hundredths(&self, words: &Words, name: &str, unit: UnitName) -> Option<i64> {
         let register = self.file.named(name).filter(|register| register.unit == unit)?;
-        let [numerator, denominator] = *register.scale.as_ref()?.get_ref();
+        let [numerator, denominator] = self.scale(words, register)?;
         Some(hundredths(self.counts(words, name)?, numerator, denominator))
+    }
+
+    /// So many of its unit are one count, as a fraction: also where another register holds how many decimals there are.
+    pub(crate) fn scale(&self, words: &Words, register: &Register) -> Option<[i64; 2]> {
+        let [numerator, denominator] = *register.scale.as_ref()?.get_ref();
+        let Some(decimals) = &register.decimals_in else { return Some([numerator, denominator]) };
+        let decimals = self.word(words, decimals.get_ref()).filter(|decimals| *decimals <= DECIMALS)?;
+        Some([numerator, denominator.checked_mul(10_i64.pow(decimals.into()))?])
     }
 
     /// Whether bits fit; `None`: they were not read.
@@ -115,12 +129,18 @@ impl Profile {
     /// The exchanges that read these registers: those that stand in a row in one, where the drive lets them be read so.
     pub(crate) fn blocks(&self, names: &BTreeSet<&str>) -> Vec<Block> {
         let link = self.file.link.get_ref();
-        let mut singles: Vec<(Space, u16)> = names
-            .iter()
-            .filter_map(|name| self.place_of(name))
-            .filter(|(register, ..)| register.access != Access::Write)
-            .map(|(_, space, address)| (space, address))
-            .collect();
+        let decimals = names.iter().filter_map(|name| self.file.named(name)?.decimals_in.as_ref()).map(name);
+        let all = names.iter().copied().chain(decimals).filter_map(|name| self.place_of(name));
+        let mut singles: Vec<(Space, u16)> = Vec::new();
+        // The second of two words, which stands for nothing without the first.
+        let mut seconds: BTreeSet<(Space, u16)> = BTreeSet::new();
+        for (register, space, address) in all.filter(|(register, ..)| register.access != Access::Write) {
+            singles.push((space, address));
+            if let Some(second) = address.checked_add(1).filter(|_| is_double(register)) {
+                singles.push((space, second));
+                seconds.insert((space, second));
+            }
+        }
         singles.sort_unstable();
         singles.dedup();
         let most = |space: Space| {
@@ -132,7 +152,7 @@ impl Profile {
         for (space, first) in singles {
             match blocks.last_mut() {
                 Some(last)
-                    if across
+                    if (across || seconds.contains(&(space, first)))
                         && last.space == space
                         && last.count < most(space)
                         && last.first.checked_add(last.count) == Some(first) =>
@@ -144,6 +164,10 @@ impl Profile {
         }
         blocks
     }
+}
+
+pub(crate) fn is_double(register: &Register) -> bool {
+    register.words.as_ref().is_some_and(|words| *words.get_ref() == 2)
 }
 
 fn name(name: &Spanned<String>) -> &str {

@@ -83,7 +83,7 @@ impl<P: Port> ProfileDrive<P> {
     fn explain(&mut self, words: &Words) -> Status {
         let profile = self.profile.clone();
         let (file, see) = (profile.file(), &profile.file().see);
-        let states = file.state.is.iter().map(toml::Spanned::get_ref);
+        let states = file.state.is.iter().map(crate::format::Spanned::get_ref);
         let mut state = State::Unknown;
         for is in states {
             match profile.fits(words, is.bits.get_ref()) {
@@ -98,13 +98,15 @@ impl<P: Port> ProfileDrive<P> {
         }
         let output_frequency = see.output.given().and_then(|name| self.frequency(words, name.get_ref()));
         state = self.coming_down(state, output_frequency);
-        let fits = |bits: Option<&toml::Spanned<crate::format::Bits>>| profile.fits(words, bits?.get_ref());
+        let fits =
+            |bits: Option<&crate::format::Spanned<crate::format::Bits>>| profile.fits(words, bits?.get_ref());
         let code = see_code(&profile, words).filter(|code| *code != 0 && state.is_fault());
-        let control = match self.owned(words, file.ownership.command.given().map(toml::Spanned::get_ref)) {
-            Told::Yes => Some(Control::Bus),
-            Told::No(_) => Some(Control::Local),
-            Told::NotTold => None,
-        };
+        let control =
+            match self.owned(words, file.ownership.command.given().map(crate::format::Spanned::get_ref)) {
+                Told::Yes => Some(Control::Bus),
+                Told::No(_) => Some(Control::Local),
+                Told::NotTold => None,
+            };
         let current = see.current.given().and_then(|name| {
             let hundredths = profile.hundredths(words, name.get_ref(), UnitName::Ampere)?;
             i32::try_from(hundredths / 10).ok()
@@ -155,7 +157,7 @@ impl<P: Port> ProfileDrive<P> {
 
     /// How many hertz are one count of a register, as a fraction.
     pub(super) fn hertz_of(&self, register: &crate::format::Register, words: &Words) -> Option<[i64; 2]> {
-        let [numerator, denominator] = *register.scale.as_ref()?.get_ref();
+        let [numerator, denominator] = self.profile.scale(words, register)?;
         match register.unit {
             UnitName::Hertz => Some([numerator, denominator]),
             UnitName::Percent => {
@@ -257,11 +259,12 @@ impl<P: Port> ProfileDrive<P> {
 
     pub(super) fn evidence(&self, status: &Status, words: &Words) -> Evidence {
         let owner = &self.profile.file().ownership;
-        let command = self.owned(words, owner.command.given().map(toml::Spanned::get_ref));
+        let command = self.owned(words, owner.command.given().map(crate::format::Spanned::get_ref));
         let other = self.agreed.is_some()
             && self.setpoint_seen(words).is_some()
             && self.agreed != self.setpoint_seen(words);
-        let reference = match self.owned(words, owner.reference.given().map(toml::Spanned::get_ref)) {
+        let reference = match self.owned(words, owner.reference.given().map(crate::format::Spanned::get_ref))
+        {
             _ if other => Told::No(OTHER_REFERENCE),
             Told::Yes if self.agreed.is_none() => Told::NotTold,
             told => told,
@@ -288,7 +291,7 @@ impl<P: Port> ProfileDrive<P> {
         let blocks = self.slow.clone();
         let words = self.read_blocks(Class::Background, &blocks).await?;
         let see = &self.profile.file().see;
-        let of = |name: Option<&toml::Spanned<String>>, unit| {
+        let of = |name: Option<&crate::format::Spanned<String>>, unit| {
             self.profile.hundredths(&words, name?.get_ref(), unit)
         };
         let volts =

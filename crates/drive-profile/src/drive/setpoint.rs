@@ -26,7 +26,7 @@ impl<P: Port> ProfileDrive<P> {
         let order = Order::Setpoint(setpoint);
         self.allow(Level::Motion, "a setpoint")?;
         let profile = self.profile.clone();
-        let Some(fact) = profile.file().setpoint.given().map(toml::Spanned::get_ref) else {
+        let Some(fact) = profile.file().setpoint.given().map(crate::format::Spanned::get_ref) else {
             return Err(Error::Unsupported { what: "a setpoint", reason: "its profile has none" });
         };
         let Some(register) = profile.file().named(fact.register.get_ref()) else {
@@ -54,6 +54,10 @@ impl<P: Port> ProfileDrive<P> {
             Setpoint::Speed(_) => register.unit == UnitName::Rpm,
         };
         match setpoint {
+            _ if register.decimals_in.is_some() || super::is_double(register) => Err(Error::Unsupported {
+                what: "a setpoint",
+                reason: "its register has two words, or another says how many decimals it has",
+            }),
             _ if takes => Ok(()),
             Setpoint::Share(_) => Err(Error::no_share()),
             _ => Err(Error::Unsupported {

@@ -13,6 +13,9 @@ use crate::{
     profile::Profile,
 };
 
+/// The speeds that are let of a drive whose own are not known: who has it knows them.
+const USUAL: &[u32] = &[1_200, 2_400, 4_800, 9_600, 19_200, 38_400, 57_600, 115_200];
+
 const MODES: [(ModeName, StopMode); 4] = [
     (ModeName::Ramp, StopMode::Ramp),
     (ModeName::Fast, StopMode::Fast),
@@ -52,7 +55,7 @@ impl Profile {
             rows: interned::list(&self.rows()),
             write_words: link.write_words.given().copied().unwrap_or(1),
             highest_address: link.highest_address.given().copied().unwrap_or(247),
-            speeds: speeds.map_or(&[9_600, 19_200, 38_400], |speeds| interned::list(speeds)),
+            speeds: speeds.map_or(USUAL, |speeds| interned::list(speeds)),
             formats: if formats.is_empty() {
                 &[CharacterFormat::F8E1, CharacterFormat::F8O1, CharacterFormat::F8N1, CharacterFormat::F8N2]
             } else {
@@ -65,6 +68,7 @@ impl Profile {
             frequency_step: self.frequency_step(),
             fault_reset: if self.file.reset.given().is_some() { "by the bus" } else { "not by the bus" },
             communication_fault: self.file.faults.communication.given().copied(),
+            identification: self.identification(),
             turnaround: Duration::from_millis(link.pause_ms.given().copied().unwrap_or(0).into()),
             status_exchanges,
             status_words: fast.iter().filter(|block| !block.space.is_bit()).map(|block| block.count).sum(),

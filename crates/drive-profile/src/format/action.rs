@@ -1,12 +1,12 @@
 //! What is written, in its order.
 
 use serde::Deserialize;
-use toml::Spanned;
 
-use super::{Answer, Bits, StateName};
+use super::{Answer, Bits, Spanned, StateName};
 
 /// Which words run the motor, and what they do while they stand.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Command {
@@ -20,6 +20,7 @@ pub struct Command {
 
 /// What a run command that stands does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Acts {
     /// It acts for as long as it stands.
@@ -32,6 +33,7 @@ pub enum Acts {
 
 /// What is done, step by step.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Action {
@@ -47,6 +49,7 @@ pub struct Action {
 
 /// One step: a write, a pause, or a reading that is waited for.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Step {
@@ -69,6 +72,7 @@ pub struct Step {
 
 /// Its stops, each by the mode that it is.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Stops {
@@ -86,6 +90,7 @@ pub struct Stops {
 
 /// The closed list of stops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum ModeName {
     /// Along the ramp.
@@ -113,6 +118,7 @@ impl Stops {
 
 /// Its starts.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Start {
@@ -126,6 +132,7 @@ pub struct Start {
 
 /// A rung of the ladder: in this state this word is written, or the drive is waited for, or the run command is due.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Rung {
@@ -142,6 +149,7 @@ pub struct Rung {
 
 /// What is done on a rung.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Deed {
     /// The word is written.

@@ -9,9 +9,8 @@ use serde::{
         value::{MapAccessDeserializer, SeqAccessDeserializer},
     },
 };
-use toml::Spanned;
 
-use super::FedBy;
+use super::{FedBy, Spanned};
 
 /// What a file says to a question. A question is never passed over in silence.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,6 +37,22 @@ impl<T> Answer<T> {
     #[must_use]
     pub const fn is_unknown(&self) -> bool {
         matches!(self, Self::Unknown)
+    }
+}
+
+#[cfg(feature = "schemars")]
+impl<T: schemars::JsonSchema> schemars::JsonSchema for Answer<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        format!("AnswerOf{}", T::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let given = generator.subschema_for::<T>();
+        schemars::json_schema!({ "anyOf": [given, { "enum": ["none", "unknown"] }] })
     }
 }
 

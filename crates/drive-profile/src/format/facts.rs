@@ -1,12 +1,12 @@
 //! Facts about a drive: where they are from, what tells it, its setpoint, faults, watchdog and what is never written.
 
 use serde::Deserialize;
-use toml::Spanned;
 
-use super::{Answer, Mark};
+use super::{Answer, Mark, Spanned};
 
 /// Where facts are from.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Source {
@@ -22,6 +22,7 @@ pub struct Source {
 
 /// That a person has tried it on a drive.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Tried {
@@ -39,6 +40,7 @@ pub struct Tried {
 
 /// Bits of a register that say something.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Bits {
@@ -65,6 +67,7 @@ impl Bits {
 
 /// Bits that tell who commands.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Owner {
@@ -76,6 +79,7 @@ pub struct Owner {
 
 /// What bits of ownership prove where they fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Proves {
     /// That it is the bus.
@@ -86,6 +90,7 @@ pub enum Proves {
 
 /// What has to read so.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Guard {
@@ -108,6 +113,7 @@ pub struct Guard {
 
 /// Which way it turns.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Direction {
@@ -125,6 +131,7 @@ pub struct Direction {
 
 /// The setpoint.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Setpoint {
@@ -142,6 +149,7 @@ pub struct Setpoint {
 
 /// What a setpoint may be, in counts.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Limits {
@@ -155,6 +163,7 @@ pub struct Limits {
 
 /// Its faults.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Faults {
@@ -168,6 +177,7 @@ pub struct Faults {
 
 /// Its codes, each with its mnemonic, meaning and remedy.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Codes {
@@ -179,6 +189,7 @@ pub struct Codes {
 
 /// Its communication watchdog.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Watchdog {
@@ -200,6 +211,7 @@ pub struct Watchdog {
 
 /// What feeds a watchdog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum FedBy {
     /// Any request to this drive.
@@ -210,6 +222,7 @@ pub enum FedBy {
 
 /// Addresses that are never written.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Forbidden {

@@ -7,12 +7,12 @@ mod action;
 mod answer;
 mod facts;
 mod register;
+mod spanned;
 
 use std::collections::BTreeMap;
 
 use drive_core::State;
 use serde::Deserialize;
-use toml::Spanned;
 
 pub use action::{Action, Acts, Command, Deed, ModeName, Rung, Start, Step, Stops};
 pub use answer::Answer;
@@ -21,12 +21,21 @@ pub use facts::{
     Watchdog,
 };
 pub use register::{Access, Byte, Order, Register, Space, Storage, UnitName};
+pub use spanned::Spanned;
 
 /// The version of the format that this crate writes. It reads this one and no other: an older file is refused with what to change.
 pub const VERSION: u32 = 1;
 
+/// A JSON schema of a profile, for editors. What it lets pass is still to be checked: see [`read`](crate::read).
+#[cfg(feature = "schemars")]
+#[must_use]
+pub fn schema() -> schemars::Schema {
+    schemars::schema_for!(File)
+}
+
 /// How sure a source is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum Mark {
     /// Read in a public repository of a program that drives it.
     R,
@@ -65,6 +74,7 @@ impl Mark {
 
 /// The whole file.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct File {
@@ -118,6 +128,7 @@ pub struct File {
 
 /// What tells a drive from others.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Who {
@@ -129,6 +140,7 @@ pub struct Who {
 
 /// What it speaks, and in what measure.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Link {
@@ -168,6 +180,7 @@ pub struct Link {
 
 /// How a file counts addresses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Numbering {
     /// As on the wire, from 0.
@@ -194,6 +207,7 @@ impl Numbering {
 
 /// Its states, the first that fits.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct States {
@@ -205,6 +219,7 @@ pub struct States {
 
 /// What a state looks like.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct StateIs {
@@ -216,6 +231,7 @@ pub struct StateIs {
 
 /// The closed list of states.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum StateName {
     /// It cannot start now.
@@ -255,6 +271,7 @@ impl StateName {
 
 /// Where what it measures stands: names of registers.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct See {
@@ -280,6 +297,7 @@ pub struct See {
 
 /// Who commands it.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Ownership {
@@ -293,6 +311,7 @@ pub struct Ownership {
 
 /// The register in which a command reads back.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct ReadsBack {

@@ -1,12 +1,12 @@
 //! A register as a file names it.
 
 use serde::Deserialize;
-use toml::Spanned;
 
-use super::Answer;
+use super::{Answer, Spanned};
 
 /// One register, coil or input.
 #[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Register {
@@ -49,6 +49,7 @@ pub struct Register {
 
 /// Where a register stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Space {
     /// A bit that can be read and written.
@@ -92,6 +93,7 @@ impl Space {
 
 /// Who may write a register.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Access {
     /// Nobody.
@@ -106,6 +108,7 @@ pub enum Access {
 
 /// Where a written value lives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Storage {
     /// Lost when the drive is switched off.
@@ -120,6 +123,7 @@ pub enum Storage {
 
 /// Which of two words is first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Order {
     /// The high word.
@@ -130,6 +134,7 @@ pub enum Order {
 
 /// A byte of a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Byte {
     /// Bits 8 to 15.
@@ -140,6 +145,7 @@ pub enum Byte {
 
 /// The closed list of units.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub enum UnitName {
     /// Bits that mean something each.
     #[default]

@@ -54,10 +54,9 @@ async fn it_starts_and_reaches_its_reference(rig: &mut Rig) {
 async fn it_reverses(rig: &mut Rig) {
     let status = rig.drive.start(Direction::Reverse).await.expect("it turns round");
     assert_eq!(status.state, State::Running);
-    rig.until("reverse at the reference", |status| {
-        status.direction == Some(Direction::Reverse) && status.output_frequency == Some(SETPOINT)
-    })
-    .await;
+    rig.until_machine("it turns the other way", |machine| machine.output_frequency < 0).await;
+    let status = rig.until_at(SETPOINT).await;
+    assert_eq!(status.direction, Some(Direction::Reverse));
     assert_eq!(rig.machine.observe().output_frequency, -3_000);
 }
 

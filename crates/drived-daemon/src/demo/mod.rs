@@ -14,6 +14,7 @@ use std::{
     time::Duration,
 };
 
+use drive_families::Family;
 use drive_fleet::{Events, ExitAction};
 use tokio::time;
 use tracing::Level;
@@ -43,6 +44,9 @@ pub struct Args {
     /// End after so many seconds instead of at Ctrl-C
     #[arg(long, value_name = "N")]
     seconds: Option<u32>,
+    /// A family to be shown, such as v20; may be given several times. Without it all are, but for those of drives from files
+    #[arg(long = "family", value_name = "FAMILY")]
+    families: Vec<Family>,
     /// Where the page and the API are served: an address and a port, or off
     #[arg(long, value_name = "ADDRESS", default_value_t)]
     http: Http,
@@ -65,7 +69,8 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     };
     let doors = Doors::prepare(DoorsConfig::of_demo(args.socket).with(Some(args.http), None)?)?;
     let mut ending = Ending::listen()?;
-    let plant = Plant::start()?;
+    let families = if args.families.is_empty() { usual() } else { args.families };
+    let plant = Plant::start(families)?;
     let groups = plant.groups();
     let faces = drived_plant::plant::Plant::start(plant.fleet.clone(), groups, true);
     let router = api::demo_router(faces.clone(), plant.stage()).merge(page::router());
@@ -76,6 +81,11 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let why = if io::stdout().is_terminal() { screen::run(show).await? } else { plain::run(show).await? };
     doors.close().await;
     farewell(&plant, why)
+}
+
+/// Those that are shown to somebody who names none: those from files would fill the lines.
+fn usual() -> Vec<Family> {
+    Family::all().into_iter().filter(|family| family.revision().is_none()).collect()
 }
 
 /// What the two ways of showing the demo need.

@@ -35,6 +35,7 @@ pub(super) struct Plant {
     pub(super) lines: Vec<PlantLine>,
     pub(super) units: Vec<Unit>,
     pub(super) fleet: Fleet,
+    families: Vec<Family>,
     story: AbortHandle,
     ended: watch::Sender<Option<Actions>>,
 }
@@ -48,12 +49,12 @@ pub(super) struct PlantLine {
 }
 
 impl Plant {
-    /// Builds the plant and sets it going.
-    pub(super) fn start() -> Result<Self, Failure> {
+    /// Builds the plant of drives of these families and sets it going.
+    pub(super) fn start(families: Vec<Family>) -> Result<Self, Failure> {
         let mut lines = Vec::new();
         let mut members = Vec::new();
         let mut builder = Fleet::builder().whatever_the_plan();
-        for (settings, names) in layout() {
+        for (settings, names) in layout(&families) {
             let simulated = SimLine::new(Wiring::rtu(settings));
             let config = LineConfig {
                 precise_timer: true,
@@ -88,7 +89,7 @@ impl Plant {
             .map(|((name, machine), handle)| Unit::new(name, machine, handle))
             .collect();
         let story = tokio::spawn(story::tell(units.clone(), fleet.clone())).abort_handle();
-        Ok(Self { lines, units, fleet, story, ended: watch::Sender::new(None) })
+        Ok(Self { lines, units, fleet, families, story, ended: watch::Sender::new(None) })
     }
 
     /// What can be tripped and pulled by hand.
@@ -110,7 +111,7 @@ impl Plant {
             let units = self.units.iter().filter(|unit| unit.name.family == family);
             Group { name: format!("all {family}"), drives: units.map(|unit| unit.name.to_string()).collect() }
         };
-        Family::all().into_iter().map(of).collect()
+        self.families.iter().copied().map(of).collect()
     }
 
     /// Ends the story and stops every motor that it has started.
@@ -126,11 +127,11 @@ impl Plant {
     }
 }
 
-/// The drives of every family on a line of 19200 8E1; a family that cannot be set to it has a line of its own.
-fn layout() -> Vec<(SerialSettings, Vec<DriveName>)> {
+/// The drives of each family on a line of 19200 8E1; a family that cannot be set to it has a line of its own.
+fn layout(families: &[Family]) -> Vec<(SerialSettings, Vec<DriveName>)> {
     let mut lines = vec![(SerialSettings::MODBUS_DEFAULT, Vec::new())];
     let mut address = 0;
-    for family in Family::all() {
+    for &family in families {
         for _ in 0..EACH {
             address += 1;
             let Ok(slave) = SlaveAddress::try_from(address) else { continue };
@@ -159,7 +160,7 @@ mod tests {
 
     #[test]
     fn every_family_has_its_drives_on_a_line_that_they_can_have() {
-        let lines = layout();
+        let lines = layout(&Family::all());
         assert_eq!(lines[0].0, SerialSettings::MODBUS_DEFAULT);
         for family in Family::all() {
             let of_family = |(_, names): &(_, Vec<DriveName>)| names.iter().any(|name| name.family == family);

@@ -7,6 +7,7 @@ mod faces;
 mod json;
 mod notify;
 mod picture;
+mod profiles;
 mod reload;
 mod report;
 mod runs;
@@ -25,6 +26,7 @@ use self::{
     faces::Faces,
     notify::Notify,
     picture::Picture,
+    profiles::Opened,
     reload::Reloader,
     report::{Form, Report},
 };
@@ -128,9 +130,14 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let names = Names::in_folder(config.doors.state.folder.as_deref());
     tell_names(&names, &config.lines, &config.groups);
     plant.set_options(options(&config.lines));
+    let opened = Opened::default();
+    opened.tell(&config.lines);
+    let by_profile = opened.clone().follow(plant.clone(), doors.audit(), fleet.events());
+    let by_profile = tokio::spawn(by_profile);
     let faces = Faces::open(faces, Surroundings::new(plant.clone(), doors.audit(), names.clone()));
     let shutdown = config.shutdown;
-    let reloader = Reloader::new(plant.clone(), notify.clone(), names, faces.clone(), args.config, config);
+    let reloader =
+        Reloader::new(plant.clone(), notify.clone(), names, faces.clone(), opened, args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
     let sources: Vec<Arc<dyn Source>> = vec![Arc::new(reloader.clone()), Arc::new(faces.clone())];
     let doors = doors.open(metrics::serve(router, plant.clone(), sources));
@@ -180,6 +187,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let _ = eeproms.await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, kept).await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, alarms).await;
+    let _ = tokio::time::timeout(AUDITED_WITHIN, by_profile).await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, audited).await;
     if read.is_none() {
         report.finish().await;

@@ -16,6 +16,7 @@ use self::changes::{Change, changes};
 use super::{
     faces::{self, Faces},
     notify::Notify,
+    profiles::Opened,
 };
 use drived_config::{
     config::{DrivePart, add},
@@ -38,6 +39,7 @@ struct Inner {
     notify: Notify,
     names: Names,
     faces: Faces,
+    opened: Opened,
     file: PathBuf,
     /// What holds now.
     config: Mutex<Config>,
@@ -53,6 +55,7 @@ impl Reloader {
         notify: Notify,
         names: Names,
         faces: Faces,
+        opened: Opened,
         file: PathBuf,
         config: Config,
     ) -> Self {
@@ -62,6 +65,7 @@ impl Reloader {
             notify,
             names,
             faces,
+            opened,
             file,
             config: Mutex::new(config),
             last,
@@ -114,6 +118,7 @@ impl Reloader {
         *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner) = leavings;
         // Also where nothing has changed: what is kept may have been mended.
         super::tell_names(&self.0.names, &config.lines, &config.groups);
+        self.0.opened.tell(&config.lines);
         let closed: Vec<&str> = changes.iter().filter_map(Change::closed_face).collect();
         self.0.faces.exchange(&closed, openings).await;
         config.faces = std::mem::take(&mut new.faces);
@@ -248,6 +253,11 @@ fn settle(
         let Some(old) = before.iter_mut().find(|old| old.name == line.name) else { continue };
         line.budget = old.budget;
         for drive in &mut line.drives {
+            let same = |old: &&DrivePart| old.settings.name == drive.settings.name && old.name == drive.name;
+            if let Some(old) = old.drives.iter().find(same) {
+                // One that was not exchanged goes on by the profile with which it was opened.
+                drive.name = old.name;
+            }
             if refused.iter().any(|(name, _)| *name == drive.settings.name)
                 && let Some(old) = old.drives.iter().find(|old| old.settings.name == drive.settings.name)
             {

@@ -115,7 +115,15 @@ pub(super) fn described(alike: &[Likeness]) -> String {
         None => likeness.family.to_string(),
     };
     match alike {
-        [] => "a Modbus slave, and no drive of a family that is known here".to_owned(),
+        [] => {
+            // Nothing is found out by writing: what reads like others' drives is not guessed.
+            let mute = Family::all().iter().filter(|family| !family.tells_itself()).count();
+            let mute = match mute {
+                0 => String::new(),
+                mute => format!(" ({mute} families have nothing to be told by: drived families)"),
+            };
+            format!("a Modbus slave, and no drive of a family that is known here{mute}")
+        }
         [only] if only.certain => format!("{}, by its own words", one(only)),
         _ => {
             let families: Vec<String> = alike.iter().map(one).collect();

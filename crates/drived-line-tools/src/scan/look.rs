@@ -7,7 +7,7 @@ use drive_bus::{
     evidence::{Defect, Fact, Finding, What},
     record::Ending,
 };
-use drive_core::{Drive, Error, Identity, PortError, SlaveAddress, Watchdog};
+use drive_core::{Drive, Error, Identity, PortError, Recognised, SlaveAddress, Watchdog};
 use drive_families::Family;
 use tokio::time::Instant;
 
@@ -145,6 +145,11 @@ pub(super) async fn identity(
         Asked::Refused => None,
         Asked::Damaged => return Looks::Damaged,
     };
+    // Some are told by registers that say no name.
+    let recognised = drive.recognise(identity.as_ref().unwrap_or(&Identity::default()));
+    if matches!(recognised, Recognised::NotMine { .. }) {
+        return Looks::Unlike;
+    }
     Looks::Like((likeness(family, identity), watchdog(&mut *drive).await))
 }
 

@@ -87,7 +87,7 @@ impl Others {
     /// families can be set to.
     pub(super) fn trials(&self, named: Option<Trial>) -> Vec<Trial> {
         let mut others: Vec<(Trial, usize)> = Vec::new();
-        for family in Family::all() {
+        for family in Family::all().into_iter().filter(|family| family.tells_itself()) {
             for trial in self.of(family) {
                 match others.iter_mut().find(|(other, _)| other.hears(&trial)) {
                     Some((other, families)) => {

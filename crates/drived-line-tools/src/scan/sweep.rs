@@ -175,6 +175,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
         let mut longest = 0;
         // Those that tell their names come first: whoever has told his is asked for no other's words.
         let mut families = Family::all();
+        families.retain(|family| family.tells_itself());
         families.sort_by_key(|family| !family.capabilities().functions.contains(&IDENTIFICATION));
         for family in families {
             if alike.iter().any(|likeness: &Likeness| likeness.certain) {
@@ -199,11 +200,13 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
                 }
             }
             let line = self.line_fed_for(step, LOOK).await?;
-            if let Looks::Like((likeness, watchdog)) = look::identity(&line, family, step.slave).await {
-                intervals.push((family, interval(family, config.protocol.is_ascii(), watchdog)));
-                alike.push(likeness);
-            } else {
-                is_damaged = true;
+            match look::identity(&line, family, step.slave).await {
+                Looks::Like((likeness, watchdog)) => {
+                    intervals.push((family, interval(family, config.protocol.is_ascii(), watchdog)));
+                    alike.push(likeness);
+                }
+                Looks::Unlike => continue,
+                Looks::Damaged => is_damaged = true,
             }
             let line = self.line_fed_for(step, LOOK).await?;
             is_damaged |= look::measurements(&line, family, step.slave).await == Looks::Damaged;

@@ -22,6 +22,8 @@ pub(super) enum Change {
     DriveExchanged(String, &'static str),
     /// Its settings are others.
     DriveChanged(Box<DriveSettings>),
+    /// The file of its profile says something else: the drive goes on by what it was opened with.
+    ProfileLater(String),
     Groups,
     /// It has a table that it did not have.
     FaceOpened(&'static str),
@@ -96,7 +98,7 @@ impl Change {
             | Self::FaceOpened(_)
             | Self::FaceClosed(_)
             | Self::FaceChanged(_) => self.to_string(),
-            Self::Later(_) => return None,
+            Self::ProfileLater(_) | Self::Later(_) => return None,
         })
     }
 
@@ -123,6 +125,7 @@ impl fmt::Display for Change {
                 write!(f, "{name} ended by its policy of the exit and begun anew, because {why}")
             }
             Self::DriveChanged(settings) => write!(f, "{} has other settings and goes on", settings.name),
+            Self::ProfileLater(name) => write!(f, "the profile of {name}: from the next start on"),
             Self::Groups => write!(f, "groups changed"),
             Self::FaceOpened(table) => write!(f, "{table} opened"),
             Self::FaceClosed(table) => write!(f, "{table} closed"),
@@ -169,6 +172,10 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
                 changes.push(Change::DriveChanged(Box::new(other.settings.clone())));
             }
             None => {}
+        }
+        let revisions = [drive, other].map(|drive| drive.name.family.revision());
+        if exchanged.is_none() && revisions[0] != revisions[1] {
+            changes.push(Change::ProfileLater((*name).to_owned()));
         }
     }
     let added = after.keys().filter(|name| !before.contains_key(*name));

@@ -63,7 +63,15 @@ async fn a_reload_that_fails_halfway_says_what_holds_and_goes_on_from_there() {
     let plant = Plant::start(fleet.clone(), Vec::new(), false);
     let around = Surroundings::new(plant.clone(), Audit::default(), Names::default());
     let faces = Faces::open(Vec::new(), around);
-    let reloader = Reloader::new(plant, Notify::start(), Names::default(), faces, file.clone(), config);
+    let reloader = Reloader::new(
+        plant,
+        Notify::start(),
+        Names::default(),
+        faces,
+        Opened::default(),
+        file.clone(),
+        config,
+    );
     // Somebody else in the program has taken a name that the file does not know yet.
     let family = Family::ATV312;
     let stranger = DriveSettings::watched("four".to_owned());

@@ -3,6 +3,7 @@
 use std::{borrow::Cow, sync::Arc};
 
 use drive_core::{Measurements, Status};
+use drive_families::Family;
 use drive_fleet::{
     Commanders, DriveHandle, FrequencyLimits, Freshness, Snapshot,
     view::{Judged, SnapshotView},
@@ -18,6 +19,9 @@ pub struct DriveView {
     pub slave: u8,
     /// The family, such as `atv312`.
     pub family: Cow<'static, str>,
+    /// What nobody can know of it, in sentences for whoever commands it; absent where its family knows all of that.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_known: Vec<Cow<'static, str>>,
     /// Whether it may be commanded at all.
     pub control: bool,
     /// Who may command it; absent where everybody who may command may.
@@ -43,6 +47,7 @@ impl DriveView {
             line: line.to_owned(),
             slave: drive.slave().number(),
             family: drive.capabilities().key.into(),
+            not_known: not_known(drive),
             control: settings.control,
             commanders: match &settings.commanders {
                 Commanders::Anyone => None,
@@ -52,6 +57,12 @@ impl DriveView {
             snapshot: SnapshotView::from(&*drive.snapshot()),
         }
     }
+}
+
+/// What its family says that nobody can know; nothing of a family that has no name here.
+fn not_known(drive: &DriveHandle) -> Vec<Cow<'static, str>> {
+    let family = drive.capabilities().key.parse::<Family>();
+    family.map(|family| family.not_known().iter().map(|said| (*said).into()).collect()).unwrap_or_default()
 }
 
 /// What is told of a drive, without what changes though nothing happens: ages, and the counters of polls. What is the same

@@ -3,6 +3,7 @@
 use clap::{Arg, Command};
 use drive_core::{Row, StopMode};
 use drive_families::Family;
+use drived_config::profiles;
 
 use super::{
     known::Known,
@@ -155,6 +156,11 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
         }
         (_, "FILE" | "PATH" | "LINK" | "FOLDER" | "DIR" | "FILE|FOLDER") => Offers::files(),
         (_, "FAMILY") => families(),
+        (_, "PROFILE") => {
+            let all = profiles::all();
+            Offers::of(all.iter().map(|(profile, _)| whole(profile.key(), profile.name())))
+                .and(Offers::files())
+        }
         (_, "FAMILY@ADDRESS" | "FAMILY@ADDRESSES") => Offers::of(
             Family::all().into_iter().map(|family| part(format!("{family}@"), family.capabilities().name)),
         ),
@@ -178,8 +184,8 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
         // Numbers, times and texts are the person's own.
         (
             _,
-            "ADDRESS" | "ADDRESSES" | "HEAD" | "MINUTES" | "MNEMONIC" | "N" | "NUMBER" | "SECONDS"
-            | "SETPOINT" | "TEXT" | "TIME" | "WORD",
+            "ADDRESS" | "ADDRESSES" | "FREQUENCY" | "HEAD" | "KEY" | "MINUTES" | "MNEMONIC" | "N" | "NUMBER"
+            | "PERSON" | "SECONDS" | "SETPOINT" | "TEXT" | "TIME" | "WORD",
         ) => Offers::default(),
         _ => Offers::default(),
     }

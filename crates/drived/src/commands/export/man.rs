@@ -12,12 +12,13 @@ use drived_words::{
 };
 
 /// The variables of the environment that are looked at.
-pub(crate) const ENVIRONMENT: [(&str, &str); 3] = [
+pub(crate) const ENVIRONMENT: [(&str, &str); 4] = [
     (
         "DRIVED_LOG",
         "how much is logged on stderr: off, error, warn, info, debug or trace; or for parts of the program, such as \
          drive_bus=trace,warn",
     ),
+    ("DRIVED_PROFILES", "a folder of profiles, of drives that are not built in: every subcommand knows them"),
     ("NO_COLOR", "where it has a value nothing is coloured; colours are for terminals in any case"),
     (
         "RUNTIME_DIRECTORY, XDG_RUNTIME_DIR",

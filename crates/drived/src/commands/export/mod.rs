@@ -15,7 +15,7 @@ use drived_gateway::virtual_unit;
 use drived_http::metrics;
 use drived_words::{failure::Failure, output};
 
-/// Print the alert rules for Prometheus, the board for Grafana, or the map of a gateway's virtual unit; write the man pages
+/// Print the alert rules for Prometheus, the board for Grafana, the map of a gateway's virtual unit, or the schema of a profile; write the man pages
 ///
 /// A running daemon has the first two at /alerts.yml and /grafana.json.
 #[derive(Debug, clap::Args)]
@@ -39,6 +39,8 @@ enum What {
     /// The registers of the virtual unit, in CSV
     #[cfg(feature = "gateway")]
     GatewayMap,
+    /// The schema of a profile, in JSON, for editors
+    ProfileSchema,
     /// A man page for each subcommand
     Man,
 }
@@ -53,6 +55,9 @@ pub(crate) fn run(args: &Args, program: clap::Command) -> Result<(), Failure> {
         (What::GatewayMap, None) => {
             let config = Config::load_workable(&args.config)?;
             output::say_as_it_is(virtual_unit::map(&numbered(&config)?.slots()))
+        }
+        (What::ProfileSchema, None) => {
+            output::say_as_it_is(format_args!("{:#}", drive_profile::schema().as_value()))
         }
         (What::Dashboard, None) => output::say_as_it_is(format_args!("{:#}", metrics::dashboard())),
     }

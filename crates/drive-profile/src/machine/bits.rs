@@ -1,0 +1,112 @@
+//! Coils, inputs and input registers of a simulated drive: Modbus Application Protocol V1.1b3, sections 6.1, 6.2, 6.4, 6.5 and 6.11.
+
+use drive_sim::Exception;
+
+use super::Machine;
+use crate::{format::Space, profile::Written};
+
+const READ_COILS: u8 = 0x01;
+const READ_INPUTS: u8 = 0x02;
+const READ_INPUT_REGISTERS: u8 = 0x04;
+const WRITE_COIL: u8 = 0x05;
+const WRITE_COILS: u8 = 0x0F;
+
+/// What a coil is written to with, on and off.
+const ON: u16 = 0xFF00;
+const OFF: u16 = 0;
+
+/// What it answers to a function that is none of its holding registers.
+pub(super) fn answer(machine: &mut Machine, request: &[u8]) -> Result<Vec<u8>, Exception> {
+    let has = request.first().is_some_and(|function| machine.has_function(*function));
+    match *request {
+        _ if !has => Err(Exception::ILLEGAL_FUNCTION),
+        [function @ (READ_COILS | READ_INPUTS), a, b, c, d] => {
+            let (first, count) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
+            let space = if function == READ_COILS { Space::Coil } else { Space::DiscreteInput };
+            read_bits(machine, function, space, first, count)
+        }
+        [READ_INPUT_REGISTERS, a, b, c, d] => {
+            read_words(machine, u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]))
+        }
+        [WRITE_COIL, a, b, c, d] => {
+            let value = match u16::from_be_bytes([c, d]) {
+                ON => 1,
+                OFF => 0,
+                _ => return Err(Exception::ILLEGAL_VALUE),
+            };
+            let address = u16::from_be_bytes([a, b]);
+            machine.write_at(Written { space: Space::Coil, address, value })?;
+            Ok(request.to_vec())
+        }
+        [WRITE_COILS, a, b, c, d, bytes, ref data @ ..] => {
+            let (first, count) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
+            write_bits(machine, first, count, usize::from(bytes), data)?;
+            Ok(vec![WRITE_COILS, a, b, c, d])
+        }
+        _ => Err(Exception::ILLEGAL_FUNCTION),
+    }
+}
+
+fn read_bits(
+    machine: &Machine,
+    function: u8,
+    space: Space,
+    first: u16,
+    count: u16,
+) -> Result<Vec<u8>, Exception> {
+    let most = machine.profile.file().link.get_ref().read_coils.given().copied().unwrap_or(1);
+    if count == 0 || count > most {
+        return Err(Exception::ILLEGAL_VALUE);
+    }
+    let bytes = u8::try_from(count.div_ceil(8)).map_err(|_| Exception::ILLEGAL_VALUE)?;
+    let mut answer = vec![0; 2 + usize::from(bytes)];
+    for at in 0..count {
+        let address = first.checked_add(at).ok_or(Exception::ILLEGAL_ADDRESS)?;
+        let bit = u8::from(machine.read_at((space, address))? != 0);
+        if let Some(byte) = answer.get_mut(2 + usize::from(at / 8)) {
+            *byte |= bit << (at % 8);
+        }
+    }
+    answer.splice(..2, [function, bytes]);
+    Ok(answer)
+}
+
+fn read_words(machine: &Machine, first: u16, count: u16) -> Result<Vec<u8>, Exception> {
+    let most = machine.profile.capabilities().read_words;
+    if count == 0 || count > most {
+        return Err(Exception::ILLEGAL_VALUE);
+    }
+    let bytes = u8::try_from(2 * count).map_err(|_| Exception::ILLEGAL_VALUE)?;
+    let mut answer = vec![READ_INPUT_REGISTERS, bytes];
+    for at in 0..count {
+        let address = first.checked_add(at).ok_or(Exception::ILLEGAL_ADDRESS)?;
+        answer.extend(machine.read_at((Space::InputRegister, address))?.to_be_bytes());
+    }
+    Ok(answer)
+}
+
+fn write_bits(
+    machine: &mut Machine,
+    first: u16,
+    count: u16,
+    bytes: usize,
+    data: &[u8],
+) -> Result<(), Exception> {
+    let most = machine.profile.file().link.get_ref().write_coils.given().copied().unwrap_or(1);
+    let fits = bytes == usize::from(count.div_ceil(8)) && data.len() == bytes;
+    if count == 0 || count > most || !fits {
+        return Err(Exception::ILLEGAL_VALUE);
+    }
+    let coil = |at: u16| {
+        let byte = data.get(usize::from(at / 8)).copied().unwrap_or(0);
+        Some(Written {
+            space: Space::Coil,
+            address: first.checked_add(at)?,
+            value: u16::from(byte >> (at % 8) & 1),
+        })
+    };
+    let coils: Option<Vec<Written>> = (0..count).map(coil).collect();
+    let coils = coils.ok_or(Exception::ILLEGAL_ADDRESS)?;
+    coils.iter().try_for_each(|coil| machine.takes((coil.space, coil.address)))?;
+    coils.into_iter().try_for_each(|coil| machine.write_at(coil))
+}

@@ -1,0 +1,230 @@
+//! The mistakes that were found in other projects' published tables and programs for drives, each given as a profile: refused, or held below
+//! motion. Where each was read stands in its line.
+
+use drive_profile::{Level, read, shipped};
+
+/// What becomes of a mistake.
+enum Ends {
+    /// It is refused, for this reason.
+    Refused(&'static str),
+    /// Its drive is never started, and this is said.
+    Below(&'static str),
+}
+
+use Ends::{Below, Refused};
+
+/// Where it was read, the profile that has it, the places in which it has it, and what becomes of it.
+type Mistake = (&'static str, &'static str, &'static [(&'static str, &'static str)], Ends);
+
+const V20: &str = "siemens/v20";
+const GOODRIVE: &str = "invt/goodrive";
+const MS300: &str = "delta/ms300";
+const FC51: &str = "danfoss/danfoss-fc51";
+const VFS15: &str = "toshiba/vfs15";
+const WJ200: &str = "hitachi/wj200";
+
+const MISTAKES: &[Mistake] = &[
+    (
+        "FluidNC: an empty command for off passes, and a truncated frame is sent",
+        V20,
+        &[(
+            "ramp = { steps = [{ write = \"STW\", words = [0x047E] }]",
+            "ramp = { steps = [{ write = \"STW\", words = [] }]",
+        )],
+        Refused("writes what STW does not take"),
+    ),
+    (
+        "FluidNC: a stop that failed is remembered as done",
+        V20,
+        &[("words = [0x047E] }], seen = [\"ready\", \"not_ready\", \"fault\"]", "words = [0x047E] }]")],
+        Refused("left in silence"),
+    ),
+    (
+        "FluidNC: the V20 is driven with its direction by a bit whose sense is the machine's: 0C7Fh forward and stop at once",
+        V20,
+        &[(
+            "ramp = { steps = [{ write = \"STW\", words = [0x047E] }]",
+            "ramp = { steps = [{ write = \"STW\", words = [0x0C7F] }]",
+        )],
+        Refused("holds a run bit"),
+    ),
+    (
+        "grblHAL: the run word is written before the speed",
+        V20,
+        &[(
+            "{ write = \"STW\", words = [0x047F] }], source = \"wb\" }\nreverse",
+            "{ write = \"STW\", words = [0x047F] }, { write = \"HSW\", words = [0x2000] }], source = \"wb\" }\nreverse",
+        )],
+        Refused("start.forward"),
+    ),
+    (
+        "Buildbotics: an error replays rows that hold fault resets, and the run row behind them",
+        GOODRIVE,
+        &[(
+            "reset = { steps = [{ write = \"CMD\", words = [7] }]",
+            "reset = { steps = [{ write = \"CMD\", words = [7] }, { write = \"CMD\", words = [1] }]",
+        )],
+        Refused("reset holds a run bit"),
+    ),
+    (
+        "wb-mqtt-serial: the setup of the FC 51 writes 043Ch, and is written again on each reconnect",
+        FC51,
+        &[(
+            "setup = \"none\"",
+            "setup = { steps = [{ write = \"CTW\", words = [0x043C] }], source = \"guides\" }",
+        )],
+        Refused("setup writes CTW"),
+    ),
+    (
+        "wb-mqtt-serial: switches write single bits of a command word that is written as a whole as well",
+        V20,
+        &[("address = 40100", "address = 40005")],
+        Refused("which is never written"),
+    ),
+    (
+        "wb-mqtt-serial: a switch that is turned off writes 0 to a register of command codes, which stops nothing",
+        GOODRIVE,
+        &[
+            (
+                "[sources]",
+                "[sources]\ntemplate = { document = \"a template\", edition = \"none\", page = \"VF51\", mark = \"W\" }",
+            ),
+            (
+                "ramp = { steps = [{ write = \"CMD\", words = [5] }], seen = [\"ready\", \"not_ready\", \"fault\"], source = \"manuals\"",
+                "ramp = { steps = [{ write = \"CMD\", words = [0] }], seen = [\"ready\", \"not_ready\", \"fault\"], source = \"template\"",
+            ),
+        ],
+        Below("stop.ramp rests on what is not sure"),
+    ),
+    (
+        "ESPHome: the setpoint is a number without limits",
+        V20,
+        &[("limits = { low = 0, high = 16384 }\n", "")],
+        Refused("left in silence"),
+    ),
+    (
+        "ESPHome: percent with what 100 % is baked into a factor",
+        V20,
+        &[("full_scale = \"owner\"\n", "")],
+        Refused("%"),
+    ),
+    (
+        "LinuxCNC wj200_vfd: a status that cannot be read skips the stop",
+        WJ200,
+        &[(
+            "ramp = { steps = [{ write = \"RUN\", coils = [false] }]",
+            "ramp = { steps = [{ await = { register = \"STATE\", mask = 0xFFFF, value = 3, source = \"manual\" }, within_ms = 500 }, { write = \"RUN\", coils = [false] }]",
+        )],
+        Refused("reads or waits before it stops"),
+    ),
+    (
+        "LinuxCNC vfdb_vfd: disable writes 0 to 2000h, which is no function there",
+        MS300,
+        &[
+            ("mark = \"R\" }\n\n[who]", "mark = \"X\" }\n\n[who]"),
+            (
+                "ramp = { steps = [{ write = \"CMD\", words = [0x0001] }]",
+                "ramp = { steps = [{ write = \"CMD\", words = [0x0000] }]",
+            ),
+        ],
+        Below("its sources contradict each other"),
+    ),
+    (
+        "LinuxCNC vfs11_vfd: reset and emergency bits that are held restart the drive again and again",
+        VFS15,
+        &[("{ pause_ms = 2000 }, { write = \"FA00\", words = [0xC000] }]", "{ pause_ms = 2000 }]")],
+        Refused("reset"),
+    ),
+    (
+        "A fork of Klipper: speed at 2000h and control at 2001h, the map of a Delta turned round",
+        MS300,
+        &[
+            ("address = 0x2000\n", "address = 0x2FFF\n"),
+            ("address = 0x2001\n", "address = 0x2000\n"),
+            ("address = 0x2FFF\n", "address = 0x2001\n"),
+        ],
+        Below("its command stands where other makers have other words"),
+    ),
+    (
+        "A fork of Klipper: the old Huanyang is given as standard Modbus",
+        GOODRIVE,
+        &[("protocol = \"modbus_rtu\"", "protocol = \"huanyang\"")],
+        Refused("is not Modbus RTU"),
+    ),
+    (
+        "FluidNC: an H2A in its own mode, whose answer has a length of two bytes",
+        GOODRIVE,
+        &[("protocol = \"modbus_rtu\"", "protocol = \"modbus_rtu_h2a\"")],
+        Refused("a length of two bytes"),
+    ),
+    (
+        "A pool pump's table: functions C3h and D0h",
+        GOODRIVE,
+        &[("functions = [3, 6", "functions = [195, 6")],
+        Refused("function 195 reads or writes no register"),
+    ),
+    (
+        "A public project for the Delta EL: run 1, stop 5 and emergency stop 3, of which 1 is a stop and 3 jogs",
+        MS300,
+        &[(
+            "ramp = { steps = [{ write = \"CMD\", words = [0x0001] }]",
+            "ramp = { steps = [{ write = \"CMD\", words = [0x0003] }]",
+        )],
+        Refused("holds a run bit"),
+    ),
+    (
+        "Web guides of the V20: command and setpoint at 40001 and 40002, ON in bits 8 to 14",
+        V20,
+        &[("mark = \"R\" }\nbits", "mark = \"W\" }\nbits"), ("address = 40100", "address = 40001")],
+        Below("rests on what is not sure"),
+    ),
+    (
+        "A web guide of Mitsubishi: 40009 as it is printed on the wire, with a base that nobody says",
+        V20,
+        &[("numbering = \"from_40001\"\n", "")],
+        Refused("left in silence"),
+    ),
+    (
+        "Mitsubishi 40009: a register that is the command when written and the status when read, read as the command in force",
+        V20,
+        &[("reads_back = \"unknown\"", "reads_back = { register = \"ZSW\", source = \"wb\" }")],
+        Refused("reads_back"),
+    ),
+    (
+        "Optidrive: the reset of one model is the second ramp of another, by the sources of both",
+        FC51,
+        &[("mark = \"D\" }", "mark = \"X\" }")],
+        Below("its sources contradict each other"),
+    ),
+];
+
+#[test]
+fn each_mistake_of_a_published_table_is_refused_or_moves_nothing() {
+    let mut wrong = Vec::new();
+    for (what, name, places, ends) in MISTAKES {
+        let (_, text) = shipped::TEXTS.iter().find(|(known, _)| known == name).expect("it is shipped");
+        let mut text = (*text).to_owned();
+        for (place, by) in *places {
+            if !text.contains(place) {
+                wrong.push(format!("{what}: {name} has not {place:?}"));
+            }
+            text = text.replacen(place, by, 1);
+        }
+        match (read(&text), ends) {
+            (Err(refusals), Refused(reason)) if refusals.to_string().contains(reason) => {
+                println!("refused: {what}: {}", refusals.0[0]);
+            }
+            (Ok(profile), Below(said)) if profile.level() < Level::Motion => {
+                let gap =
+                    profile.gaps().iter().find(|gap| gap.keeps_from.is_some() && gap.what.contains(said));
+                match gap {
+                    Some(gap) => println!("held at {}: {what}: {gap}", profile.level()),
+                    None => wrong.push(format!("{what}: held by {:#?}", profile.gaps())),
+                }
+            }
+            (Err(refusals), _) => wrong.push(format!("{what}: refused for another reason:\n{refusals}")),
+            (Ok(profile), _) => wrong.push(format!("{what}: it reaches {}", profile.level())),
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+}

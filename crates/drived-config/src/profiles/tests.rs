@@ -1,0 +1,109 @@
+//! Folders of profiles: what is refused, and what a file that is read again changes.
+
+use std::fs;
+
+use super::*;
+use crate::testing;
+
+/// A profile that is shipped, under another key.
+fn text(key: &str) -> String {
+    let (_, text) = shipped::TEXTS.iter().find(|(name, _)| *name == "siemens/v20").expect("it is shipped");
+    text.replace("key = \"v20\"", &format!("key = \"{key}\""))
+}
+
+fn folder(name: &str) -> (testing::Folder, PathBuf) {
+    let folder = testing::Folder::new(name);
+    let profiles = folder.file("profiles");
+    fs::create_dir_all(profiles.join("maker")).unwrap();
+    (folder, profiles)
+}
+
+fn family(key: &str) -> Family {
+    key.parse().unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn the_profiles_of_a_folder_and_of_those_in_it_are_families_by_their_keys() {
+    let (_kept, profiles) = folder("families");
+    fs::write(profiles.join("one.toml"), text("folder-one")).unwrap();
+    fs::write(profiles.join("maker").join("two.toml"), text("folder-two")).unwrap();
+    fs::write(profiles.join("notes.txt"), "no profile").unwrap();
+    let read = Folder::read(&profiles).unwrap();
+    assert_eq!(read.keys().collect::<Vec<_>>(), ["folder-one", "folder-two"]);
+    for key in ["folder-one", "folder-two"] {
+        assert!(read.has(family(key)), "{key}");
+        assert_eq!(family(key).capabilities().name, "Siemens SINAMICS V20");
+    }
+    assert!(read.has(Family::ATV312), "what is built in is from no folder");
+}
+
+#[test]
+fn a_name_that_is_shipped_or_built_in_or_given_twice_is_refused_with_the_file() {
+    for (key, reason) in [("v20", "is the name of a family"), ("atv312", "is the name of a family")] {
+        let (_kept, profiles) = folder(key);
+        fs::write(profiles.join("own.toml"), text(key)).unwrap();
+        let error = Folder::read(&profiles).unwrap_err().to_string();
+        assert!(error.contains(reason) && error.contains("own.toml"), "{error}");
+    }
+    let (_kept, profiles) = folder("twice");
+    fs::write(profiles.join("one.toml"), text("folder-twice")).unwrap();
+    fs::write(profiles.join("two.toml"), text("folder-twice")).unwrap();
+    let error = Folder::read(&profiles).unwrap_err().to_string();
+    assert!(error.contains("one.toml") && error.contains("two.toml"), "{error}");
+    assert!("folder-twice".parse::<Family>().is_err(), "nothing became known");
+}
+
+#[test]
+fn a_file_that_is_no_profile_is_refused_with_its_line_and_what_to_write() {
+    let (_kept, profiles) = folder("damaged");
+    let damaged = text("folder-damaged").replace("words = [0x047A] }]", "words = [0x047F] }]");
+    fs::write(profiles.join("damaged.toml"), damaged).unwrap();
+    let error = Folder::read(&profiles).unwrap_err().to_string();
+    assert!(
+        error.contains("damaged.toml:") && error.contains("holds a run bit") && error.contains("write"),
+        "{error}"
+    );
+    fs::write(profiles.join("damaged.toml"), "x".repeat(LONGEST + 1)).unwrap();
+    assert!(Folder::read(&profiles).is_err());
+    let error = Folder::read(&profiles.join("nowhere")).unwrap_err().to_string();
+    assert!(error.contains("nowhere"), "{error}");
+}
+
+#[test]
+fn a_file_that_is_read_again_is_another_family_only_where_its_content_is_another() {
+    let (_kept, profiles) = folder("again");
+    let file = profiles.join("own.toml");
+    fs::write(&file, text("folder-again")).unwrap();
+    Folder::read(&profiles).unwrap();
+    let before = family("folder-again");
+    Folder::read(&profiles).unwrap();
+    assert_eq!(family("folder-again").revision(), before.revision());
+    assert_eq!(changed(before), None);
+    fs::write(&file, text("folder-again").replace("page 111", "page 112") + "\n# another\n").unwrap();
+    let told = changed(before).expect("the file says something else");
+    assert!(told.contains(short(before.revision().unwrap())) && told.contains("own.toml"), "{told}");
+    Folder::read(&profiles).unwrap();
+    let after = family("folder-again");
+    assert_eq!(after, before, "a drive is known by its name");
+    assert_ne!(after.revision(), before.revision());
+    assert_eq!(before.capabilities().name, after.capabilities().name, "what is open goes on");
+    fs::remove_file(&file).unwrap();
+    let read = Folder::read(&profiles).unwrap();
+    assert!(!read.has(after), "it is not in the folder any more");
+    assert!(changed(after).expect("it is gone").contains("cannot be read"));
+}
+
+#[test]
+fn what_a_profile_does_not_know_is_the_familys_to_say() {
+    let (_kept, profiles) = folder("unknown");
+    fs::write(profiles.join("own.toml"), text("folder-unknown")).unwrap();
+    Folder::read(&profiles).unwrap();
+    let family = family("folder-unknown");
+    assert!(
+        family.not_known().iter().any(|said| said.contains("who commands it")),
+        "{:?}",
+        family.not_known()
+    );
+    assert!(!family.tells_itself(), "a V20 has no fingerprint");
+    assert!(Family::ATV312.not_known().is_empty() && Family::ATV312.tells_itself());
+}

@@ -1,0 +1,88 @@
+//! `drived profile check`: what a file that is being written has reached.
+
+use std::{fs, path::PathBuf};
+
+use drive_profile::{Level, Profile, Refusals};
+use serde_json::{Value, json};
+
+use drived_config::profiles;
+use drived_words::{
+    failure::Failure,
+    output::{self, JsonArgs},
+};
+
+/// Check a profile: what is refused, with its line and what to write; the level that it reaches, and the next question
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The file, in TOML
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    match profiles::profile(&args.file) {
+        Ok(profile) => args.json.say(|| object(&profile), || tell(&profile)),
+        Err(profiles::ProfilesError::Refused { refusals, .. }) => {
+            args.json.say(|| refused(&refusals), || tell_refusals(args, &refusals))?;
+            let number = output::counted(refusals.0.len(), "place is", "places are");
+            Err(Failure::Input(format!("{}: {number} refused", args.file.display())))
+        }
+        Err(error) => Err(Failure::Input(error.to_string())),
+    }
+}
+
+fn tell(profile: &Profile) -> Result<(), Failure> {
+    output::say(format_args!("{}: it reaches {}", profile.name(), profile.level()))?;
+    let (keeps, said): (Vec<_>, Vec<_>) = profile.gaps().iter().partition(|gap| gap.keeps_from.is_some());
+    if let Some(next) = keeps.first() {
+        output::say(format_args!("next question, line {}: {} ({})", next.line, next.question, next.what))?;
+    }
+    for gap in keeps.iter().skip(1) {
+        output::say(format_args!("  line {}: {}: {}", gap.line, gap.what, gap.question))?;
+    }
+    if profile.level() == Level::Motion {
+        output::say("nothing keeps it from motion; drived profile try climbs with the real drive")?;
+    }
+    if !said.is_empty() {
+        output::say("not known, and told to whoever it matters to:")?;
+    }
+    said.iter().try_for_each(|gap| output::say(format_args!("  {}: {}", gap.what, gap.question)))
+}
+
+fn tell_refusals(args: &Args, refusals: &Refusals) -> Result<(), Failure> {
+    let text = fs::read_to_string(&args.file).unwrap_or_default();
+    for refusal in &refusals.0 {
+        output::say(format_args!("{}:{}: {}", args.file.display(), refusal.line, refusal.reason))?;
+        if let Some(line) = text.lines().nth(refusal.line.saturating_sub(1)) {
+            output::say_as_it_is(format_args!("  | {}", line.trim_end()))?;
+        }
+        output::say(format_args!("  write {}", refusal.write))?;
+    }
+    Ok(())
+}
+
+pub(crate) fn object(profile: &Profile) -> Value {
+    let gaps = profile.gaps().iter().map(|gap| {
+        json!({
+            "keeps_from": gap.keeps_from.map(|level| level.to_string()),
+            "line": gap.line,
+            "what": gap.what,
+            "question": gap.question,
+            "told_when_commanded": gap.matters,
+        })
+    });
+    json!({
+        "profile": profile.key(),
+        "name": profile.name(),
+        "level": profile.level().to_string(),
+        "sha256": profile.digest(),
+        "gaps": gaps.collect::<Vec<_>>(),
+    })
+}
+
+fn refused(refusals: &Refusals) -> Value {
+    let all = refusals.0.iter().map(|of| json!({ "line": of.line, "reason": of.reason, "write": of.write }));
+    json!({ "refused": all.collect::<Vec<_>>() })
+}

@@ -1,0 +1,114 @@
+//! `drived profile try`: the ladder of a profile, climbed on the real drive, step by step, each asked for.
+
+mod console;
+mod protocol;
+mod steps;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use drive_core::{Frequency, SlaveAddress};
+use drive_families::Family;
+use drive_profile::{Profile, definition, shipped};
+
+use drived_client::own_line::{close, open_line_of};
+use drived_config::profiles::ProfilesError;
+use drived_words::{
+    drive_options::OptionArgs,
+    drive_spec::DriveName,
+    failure::Failure,
+    line_spec::{self, LineSpec},
+    output,
+};
+
+use self::{console::Console, protocol::Protocol, steps::Steps};
+
+/// Try a profile on the real drive, step by step: read all, watch a start from the panel, test the stop, start at the lowest speed
+///
+/// Each step is asked for, and a step further is only done where the one before was right. The motor is started by this program in
+/// the last step alone, when the profile reaches motion and somebody has confirmed by the drive's name that the motor is uncoupled.
+/// What was seen is written into the file, signed with name, drive, firmware and day. Ctrl-C ends it, with the motor stopped.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The profile: its file, into which the protocol is written, or the key of one that is shipped
+    #[arg(value_name = "PROFILE")]
+    profile: String,
+    // The text has brackets that a doc comment would take for links.
+    #[arg(long, value_name = "LINE", help = line_spec::HELP)]
+    line: LineSpec,
+    /// The drive's address
+    #[arg(long, value_name = "ADDRESS")]
+    address: u8,
+    /// Who tries it
+    #[arg(long, value_name = "PERSON")]
+    person: String,
+    /// On which drive, with its rating
+    #[arg(long, value_name = "TEXT")]
+    drive: String,
+    /// Its firmware, as its display shows it
+    #[arg(long, value_name = "TEXT")]
+    firmware: String,
+    /// The speed of the start
+    #[arg(long, value_name = "FREQUENCY", default_value = "5Hz")]
+    lowest: Frequency,
+    #[command(flatten)]
+    options: OptionArgs,
+}
+
+pub(crate) async fn run(args: Args) -> Result<(), Failure> {
+    let (text, file) = text(&args.profile)?;
+    let slave = SlaveAddress::try_from(args.address).map_err(|error| Failure::Input(error.to_string()))?;
+    let mut protocol = Protocol {
+        person: args.person.clone(),
+        drive: args.drive.clone(),
+        firmware: args.firmware.clone(),
+        day: chrono::Local::now().format("%Y-%m-%d").to_string(),
+        seen: Vec::new(),
+    };
+    // By what it is, and by what it is once it was tried: only the last step needs more.
+    let (_, tried) = protocol.into_file(&text).map_err(Failure::Input)?;
+    let name = DriveName { family: family(tried), slave };
+    let options = args.options.of(&[name])?;
+    let config = args.line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
+    let line = open_line_of(Some(name), config.clone()).await?;
+    let mut console = Console::of_terminal();
+    let steps = Steps { name, line: line.clone(), config, options, lowest: args.lowest };
+    let climbed = steps.climb(&mut console, &mut protocol.seen).await;
+    close(&line).await;
+    climbed?;
+    let (with, profile) = protocol.into_file(&text).map_err(Failure::Input)?;
+    output::say(format_args!("{}: it reaches {} now", profile.key(), profile.level()))?;
+    match file {
+        Some(file) => {
+            fs::write(&file, with).map_err(|error| Failure::Input(format!("{}: {error}", file.display())))?;
+            output::say(format_args!("the protocol stands in {}", file.display()))
+        }
+        None => {
+            output::say("the profile is shipped: put this into a copy of its file, under a key of its own")?;
+            output::say_as_it_is(protocol.table().trim_end())
+        }
+    }
+}
+
+/// The text of a profile, and its file where it has one of its own.
+fn text(said: &str) -> Result<(String, Option<PathBuf>), Failure> {
+    if let Some(profile) = shipped::find(said) {
+        let found = shipped::TEXTS.iter().find(|(_, text)| drive_profile::digest(text) == profile.digest());
+        return Ok((found.map(|(_, text)| (*text).to_owned()).unwrap_or_default(), None));
+    }
+    let (_, file) = crate::named(said)?;
+    let file = file.unwrap_or_else(|| Path::new(said).to_owned());
+    let read = fs::read_to_string(&file);
+    let read = read.map_err(|error| ProfilesError::File { file: file.clone(), why: error.to_string() });
+    Ok((read.map_err(|error| Failure::Input(error.to_string()))?, Some(file)))
+}
+
+fn family(profile: Profile) -> Family {
+    Family::new(definition(&Arc::new(profile)))
+}
+
+#[cfg(test)]
+mod tests;

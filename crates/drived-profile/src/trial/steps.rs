@@ -1,0 +1,207 @@
+//! The steps, from what moves nothing to what starts the motor.
+
+use std::time::Duration;
+
+use drive_bus::{Line, LineConfig};
+use drive_core::{Direction, Drive, Frequency, State, Status, StopMode};
+use drive_families::Options;
+use drive_fleet::{Order, Until};
+use tokio::time::{Instant, sleep};
+
+use drived_client::own_line::{open_drive, wait_at_most, words};
+use drived_tools::commanded::Commanded;
+use drived_words::{drive_spec::DriveName, failure::Failure};
+
+use super::console::Console;
+
+/// How long a person has until what he does at the panel shows.
+const AT_THE_PANEL: Duration = Duration::from_secs(60);
+
+/// From one look to the next.
+const LOOK: Duration = Duration::from_millis(250);
+
+/// A drive on its line, and what its owner says of it.
+pub(super) struct Steps {
+    pub name: DriveName,
+    pub line: Line,
+    pub config: LineConfig,
+    pub options: Options,
+    /// The speed of the start.
+    pub lowest: Frequency,
+}
+
+impl Steps {
+    /// Climbs as far as the profile lets, and notes what was seen.
+    ///
+    /// # Errors
+    /// A step was not right, or the drive does not answer: nothing further is done.
+    pub(super) async fn climb(&self, console: &mut Console, seen: &mut Vec<String>) -> Result<(), Failure> {
+        seen.push(self.read_all(console).await?);
+        seen.push(self.watch_a_start(console).await?);
+        let stops = !self.name.family.capabilities().stop_modes.is_empty();
+        if !stops {
+            return console.say("the profile knows no stop: the trial ends here, with what was read");
+        }
+        seen.push(self.test_the_stop(console).await?);
+        seen.extend(self.start_slowly(console).await?);
+        Ok(())
+    }
+
+    /// 1. Everything that can be read, for a person who compares it with the panel.
+    async fn read_all(&self, console: &mut Console) -> Result<String, Failure> {
+        console.say("1. Everything is read. Nothing is written.")?;
+        let mut drive = self.drive();
+        let status = drive.status().await.map_err(|error| self.failed(&error))?;
+        console.say(format_args!("the drive shows {status}"))?;
+        let mut refused = 0;
+        let rows = drive.capabilities().rows;
+        for row in rows {
+            if !row.access.is_readable() {
+                continue;
+            }
+            match drive.read_parameter(row).await {
+                Ok(word) => {
+                    console.say(format_args!("  {} = {} ({})", row.code, row.show(word), row.name))?
+                }
+                Err(error) => {
+                    refused += 1;
+                    console.say(format_args!("  {}: {error}", row.code))?;
+                }
+            }
+        }
+        self.agreed(console, "Does the panel show the same values, those of speed and current first?")
+            .await?;
+        Ok(match refused {
+            0 => format!("all {} registers were read and agree with the panel", rows.len()),
+            refused => format!(
+                "what was read agrees with the panel; {refused} of {} registers were refused",
+                rows.len()
+            ),
+        })
+    }
+
+    /// 2. A start from the panel, so that the states of the profile are seen before anything is written.
+    async fn watch_a_start(&self, console: &mut Console) -> Result<String, Failure> {
+        console
+            .ask("2. Start the motor slowly at the panel, where that can be done safely; then press Enter")
+            .await?;
+        let mut drive = self.drive();
+        let running = self.until(&mut *drive, |status| status.state == State::Running).await?;
+        console.say(format_args!("the drive shows {running}"))?;
+        self.agreed(console, "Does the panel show the same speed, and does the motor turn that way?").await?;
+        console.ask("Stop it at the panel; then press Enter").await?;
+        let rests =
+            |status: &Status| matches!(status.state, State::Ready | State::NotReady | State::Disabled);
+        let stands = self.until(&mut *drive, rests).await?;
+        console.say(format_args!("the drive shows {stands}"))?;
+        self.agreed(console, "Does the motor stand?").await?;
+        Ok("a start and a stop from the panel were seen in the states".to_owned())
+    }
+
+    /// 3. The stop, on a motor that somebody else has started.
+    async fn test_the_stop(&self, console: &mut Console) -> Result<String, Failure> {
+        console
+            .ask(
+                "3. Give the command to the bus at the drive, and start the motor slowly by whatever starts it then (another \
+                 master, a terminal); or leave it at rest. Then press Enter: a stop is sent",
+            )
+            .await?;
+        let mut drive = self.drive();
+        let turned = drive.status().await.map_err(|error| self.failed(&error))?.state == State::Running;
+        let mut one = self.commanded()?;
+        let stopped = one.stop(StopMode::Ramp).await;
+        let (modes, status) = stopped?;
+        console.say(format_args!("the stop is confirmed ({modes}): the drive shows {status}"))?;
+        self.agreed(console, "Does the motor stand?").await?;
+        Ok(match turned {
+            true => "a stop over the bus stopped a turning motor".to_owned(),
+            false => "a stop over the bus was taken by a drive at rest".to_owned(),
+        })
+    }
+
+    /// 4. A start at the lowest speed, where the profile reaches motion.
+    async fn start_slowly(&self, console: &mut Console) -> Result<Option<String>, Failure> {
+        let key = self.name.family.capabilities().key;
+        let confirmed = console
+            .ask(format_args!(
+                "4. The motor is started by this program at {}. UNCOUPLE IT from its machine, see that nobody is near, and that \
+                 the emergency stop works. Type {key} when that is so; anything else ends the trial here",
+                self.lowest
+            ))
+            .await?;
+        if confirmed != key {
+            console.say("the motor is not started; what was seen so far is kept")?;
+            return Ok(None);
+        }
+        let mut one = self.commanded()?;
+        let order = Order::Start {
+            direction: Direction::Forward,
+            setpoint: Some(self.lowest.into()),
+            until: Until::InForce,
+        };
+        let started = one.start(async |drive| drive.order(order).await).await;
+        let (started, status) = match started {
+            Ok(started) => started,
+            Err(failure) => {
+                let _ = one.stop(StopMode::Ramp).await;
+                return Err(failure);
+            }
+        };
+        console.say(format_args!("{started}: the drive shows {status}"))?;
+        let turns = console.agrees("Does the motor turn slowly, forward?").await;
+        let (_, stopped) = one.stop(StopMode::Ramp).await?;
+        console.say(format_args!("stopped: the drive shows {stopped}"))?;
+        if !turns? {
+            return Err(not_right());
+        }
+        self.agreed(console, "Does the motor stand?").await?;
+        Ok(Some(format!(
+            "a start at {} turned the uncoupled motor forward, and a stop stopped it",
+            self.lowest
+        )))
+    }
+
+    fn drive(&self) -> Box<dyn Drive> {
+        let mut drive = open_drive(&self.line, self.name, &self.options);
+        wait_at_most(&mut *drive);
+        drive
+    }
+
+    fn commanded(&self) -> Result<Commanded, Failure> {
+        Commanded::over(self.name, self.line.clone(), self.config.clone(), &self.options, Vec::new())
+    }
+
+    /// Looks until a status is so.
+    async fn until(&self, drive: &mut dyn Drive, is_so: impl Fn(&Status) -> bool) -> Result<Status, Failure> {
+        let until = Instant::now() + AT_THE_PANEL;
+        loop {
+            let status = drive.status().await.map_err(|error| self.failed(&error))?;
+            if is_so(&status) {
+                return Ok(status);
+            }
+            if Instant::now() >= until {
+                return Err(Failure::Drive(format!(
+                    "{}: it did not show within {AT_THE_PANEL:?}; the drive shows {status}: the states of the profile are not those \
+                     of this drive, or it was not started",
+                    self.name
+                )));
+            }
+            sleep(LOOK).await;
+        }
+    }
+
+    async fn agreed(&self, console: &mut Console, question: &str) -> Result<(), Failure> {
+        if console.agrees(question).await? { Ok(()) } else { Err(not_right()) }
+    }
+
+    fn failed(&self, error: &drive_core::Error) -> Failure {
+        Failure::Drive(words(self.name, &self.config, error))
+    }
+}
+
+fn not_right() -> Failure {
+    Failure::Drive(
+        "what the profile says is not what this drive does: the trial ends here, and nothing is signed. Mend the profile, and try it anew"
+            .to_owned(),
+    )
+}

@@ -1,0 +1,187 @@
+//! Drives from files at every door that the five families have: on a line of one's own, and in the daemon, with a folder, a reload and the
+//! audit log. Over ptys, in real time; nothing here asserts a duration.
+#![cfg(unix)]
+
+mod support;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use support::{File, Running, Sim, drived, path, run};
+
+/// The shipped profile of the Goodrive under a name of somebody's own.
+const OWN: &str = include_str!("../../drive-profile/profiles/invt/goodrive.toml");
+
+/// A folder with one profile; removed when dropped.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let folder = path(&format!("{name}-profiles"));
+        fs::create_dir_all(&folder).expect("it can be made");
+        let folder = Self(folder);
+        folder.write("");
+        folder
+    }
+
+    /// Writes the profile with something behind it.
+    fn write(&self, more: &str) {
+        let text = OWN.replace("key = \"goodrive\"", "key = \"own-drive\"") + more;
+        fs::write(self.0.join("own.toml"), text).expect("it can be written");
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+#[test]
+fn a_drive_from_a_file_is_asked_and_commanded_on_a_line_as_the_five_are() {
+    let sim = Sim::serve("profile-line", &["goodrive@3"]);
+    let on = |words: &[&str]| sim.on("goodrive@3", words);
+    assert!(on(&["status"]).assert_done().contains("ready"));
+    // Its highest setpoint is its owner's to say.
+    on(&["setpoint", "20Hz"]).assert_refused(1, "highest");
+    on(&["setpoint", "20Hz", "--option", "highest=50Hz"]).assert_done();
+    let started = on(&["start", "--option", "highest=50Hz"]);
+    assert!(started.assert_done().contains("running"), "{}", started.out);
+    assert!(started.err.contains("may start the motor when its power comes back"), "{}", started.err);
+    on(&["stop"]).assert_done();
+    assert!(on(&["param", "dump"]).assert_done().contains("STATE"));
+    assert!(on(&["faults"]).code == Some(0));
+    assert!(run(&["families", "goodrive"]).assert_done().contains("INVT Goodrive"));
+    let plan = run(&["plan", "--line", "/dev/ttyUSB0,19200,8E1", "--drive", "goodrive@1-10"]);
+    plan.assert_done();
+}
+
+#[test]
+fn an_order_beyond_the_level_of_a_drive_is_refused_with_what_keeps_it_from_there() {
+    let sim = Sim::serve("profile-level", &["ms300@4"]);
+    let refused = sim.on("ms300@4", &["start"]);
+    refused.assert_refused(1, "its profile reaches stop and no further");
+    refused.assert_refused(1, "other makers have other words");
+    sim.on("ms300@4", &["stop"]).assert_done();
+}
+
+#[test]
+fn profiles_are_listed_shown_and_checked_and_a_template_asks_the_next_question() {
+    let listed = run(&["profile", "list"]);
+    for words in ["v20", "Siemens SINAMICS V20", "motion", "ms300", "stop", "shipped"] {
+        assert!(listed.assert_done().contains(words), "{}", listed.out);
+    }
+    let shown = run(&["profile", "show", "v20"]);
+    for words in ["level motion", "How it is stopped", "write STW 047Eh", "Operating Instructions"] {
+        assert!(shown.assert_done().contains(words), "{}", shown.out);
+    }
+    let shown = run(&["profile", "show", "v20", "--json"]);
+    assert!(shown.assert_done().contains("\"level\":\"motion\""), "{}", shown.out);
+    let file = path("new-profile.toml");
+    let file = file.to_str().expect("the path is text");
+    run(&["profile", "new", "my-drive", "--to", file]).assert_done();
+    run(&["profile", "new", "my-drive", "--to", file]).assert_refused(2, "exists");
+    let checked = run(&["profile", "check", file]);
+    assert!(checked.assert_done().contains("it reaches watch"), "{}", checked.out);
+    assert!(checked.out.contains("next question"), "{}", checked.out);
+    let damaged = fs::read_to_string(file).expect("it is there").replace("[who]\n", "[who]\ncolour = 1\n");
+    fs::write(file, damaged).expect("it can be written");
+    let refused = run(&["profile", "check", file]);
+    refused.assert_refused(2, "refused");
+    assert!(refused.out.contains("colour") && refused.out.contains("write"), "{}", refused.out);
+    fs::remove_file(file).expect("it is there");
+    run(&["profile", "show", "no-such-drive"]).assert_refused(2, "there is no profile");
+    assert!(run(&["export", "profile-schema"]).assert_done().contains("$schema"));
+}
+
+#[test]
+fn the_environment_names_a_folder_for_every_subcommand_and_a_broken_file_there_stops_nobody() {
+    let folder = Folder::new("environment");
+    let with = |words: &[&str]| {
+        let output = drived(words).env("DRIVED_PROFILES", &folder.0).output().expect("the program runs");
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr),
+        )
+    };
+    let (code, said) = with(&["profile", "list"]);
+    assert!(code == Some(0) && said.contains("own-drive") && said.contains("own.toml"), "{said}");
+    fs::write(folder.0.join("broken.toml"), "format = 1\n").expect("it can be written");
+    let (code, said) = with(&["families"]);
+    assert!(code == Some(0) && said.contains("broken.toml") && said.contains("atv312"), "{said}");
+}
+
+fn configuration(folder: &Path, state: &Path, port: &str) -> String {
+    format!(
+        "profiles = \"{}\"\nstate = \"{}\"\nsnapshots = \"500ms\"\n[http]\nlisten = \"off\"\n[lines.bench]\nport = \"{port},19200,8E1\"\n\
+         [[drives]]\nline = \"bench\"\ndrive = \"own-drive@3\"\nname = \"pump\"\ncontrol = true\noptions = {{ highest = \"50Hz\" }}\n",
+        folder.display(),
+        state.display()
+    )
+}
+
+#[test]
+fn the_daemon_drives_it_keeps_to_the_profile_with_which_it_began_and_its_audit_log_names_it() {
+    let folder = Folder::new("daemon");
+    let state = path("daemon-profiles-state");
+    let sim = Sim::serve("profile-daemon", &["goodrive@3"]);
+    let file = File::new("profile-daemon", &configuration(&folder.0, &state, sim.link()));
+    run(&["check", "--config", file.path()]).assert_done();
+    let socket = path("profile-daemon.sock");
+    let socket = socket.to_str().expect("the path is text");
+    let mut daemon = Running::start(&["run", "--config", file.path(), "--socket", socket]);
+    daemon.wait_for(r#""event":"connected""#);
+    let started = run(&["start", "pump", "--setpoint", "20Hz", "--socket", socket]);
+    started.assert_done();
+    assert!(started.err.contains("may start the motor when its power comes back"), "{}", started.err);
+    folder.write("\n# Something else.\n");
+    let reloaded = run(&["reload", "--socket", socket]);
+    assert!(
+        reloaded.assert_done().contains("the profile of pump: from the next start on"),
+        "{}",
+        reloaded.out
+    );
+    let again = run(&["reload", "--socket", socket]);
+    assert!(
+        again.assert_done().contains("the profile of pump"),
+        "it still goes on by the old one: {}",
+        again.out
+    );
+    assert!(run(&["status", "pump", "--socket", socket]).assert_done().contains("running"));
+    // A file that is gone is no profile any more, and the old configuration holds.
+    fs::remove_file(folder.0.join("own.toml")).expect("it is there");
+    run(&["reload", "--socket", socket])
+        .assert_refused(2, "no profile in the folder says any more what own-drive is");
+    assert!(run(&["status", "pump", "--socket", socket]).assert_done().contains("running"));
+    run(&["stop", "pump", "--socket", socket]).assert_done();
+    let (code, last) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{last}");
+    let log = fs::read_to_string(state.join("audit")).expect("it is there");
+    let connected =
+        log.lines().find(|line| line.contains("driven by the profile own-drive")).expect("it stands there");
+    let hex = connected.split("own-drive ").nth(1).and_then(|rest| rest.get(..64)).unwrap_or_default();
+    assert!(hex.len() == 64 && hex.bytes().all(|byte| byte.is_ascii_hexdigit()), "{connected}");
+    let _ = fs::remove_dir_all(&state);
+}
+
+#[test]
+fn a_configuration_whose_folder_or_name_cannot_be_is_refused_with_the_line() {
+    let folder = Folder::new("refused");
+    let state = path("refused-state");
+    let text = configuration(&folder.0, &state, "/dev/null");
+    for (place, by, reason) in [
+        ("profiles = \"", "profiles = \"/nowhere", "nowhere"),
+        ("own-drive@3", "other-drive@3", "is not a family of drives"),
+        ("profiles", "profile", "unknown field"),
+    ] {
+        let file = File::new("refused-profiles", &text.replacen(place, by, 1));
+        run(&["check", "--config", file.path()]).assert_refused(2, reason);
+    }
+    fs::write(folder.0.join("v20.toml"), OWN.replace("key = \"goodrive\"", "key = \"v20\""))
+        .expect("it can be written");
+    let file = File::new("refused-taken", &text);
+    run(&["check", "--config", file.path()])
+        .assert_refused(2, "is the name of a family that this program has");
+}
