@@ -10,7 +10,7 @@ mod who;
 use std::{fmt, ops::Range};
 
 use crate::format::Spanned;
-use sha2::{Digest as _, Sha256};
+use ring::digest::SHA256;
 
 use crate::{
     format::{File, Register, VERSION},
@@ -97,7 +97,8 @@ pub fn read(text: &str) -> Result<Profile, Refusals> {
 /// The SHA-256 of a text, in hexadecimal digits: what its profile is known by.
 #[must_use]
 pub fn digest(text: &str) -> String {
-    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
+    let digest = ring::digest::digest(&SHA256, text.as_bytes());
+    digest.as_ref().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A file under check.
