@@ -64,19 +64,19 @@ use Step as S;
 impl Step {
     /// All of them.
     pub const ALL: [Self; 13] = [
-        S::Stop,
-        S::Command,
-        S::Edge,
-        S::Setpoint,
-        S::Read,
-        S::Neighbour,
-        S::Drop,
-        S::Answer,
-        S::Lose,
-        S::Damage,
-        S::Refuse,
-        S::ComesLate,
-        S::Wait,
+        Self::Stop,
+        Self::Command,
+        Self::Edge,
+        Self::Setpoint,
+        Self::Read,
+        Self::Neighbour,
+        Self::Drop,
+        Self::Answer,
+        Self::Lose,
+        Self::Damage,
+        Self::Refuse,
+        Self::ComesLate,
+        Self::Wait,
     ];
 }
 
@@ -477,6 +477,10 @@ impl World {
                 return Err("a call ends once");
             }
             let writes = call.pdu[0] == 6;
+            let asked = call.sent.last().copied();
+            if outcome.is_ok() && asked.is_some_and(|asked| self.master.asked_at() > asked) {
+                return Err("a value is no younger than its question");
+            }
             match &outcome {
                 Ok(Ok(Response::ReadHoldingRegisters(words))) => {
                     let number = words[0] / 16;
@@ -529,9 +533,6 @@ impl World {
         Ok(())
     }
 }
-
-/// Every invariant that is held here.
-pub const INVARIANTS: usize = 19;
 
 /// What was explored.
 #[derive(Debug, Clone, Default)]
