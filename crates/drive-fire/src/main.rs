@@ -8,7 +8,7 @@ use std::{
 };
 
 use clap::{Parser, Subcommand};
-use drive_fire::{fuzz, matrix, model, report::Told, story};
+use drive_fire::{differential, fuzz, matrix, model, report::Told, story};
 
 /// Attacks everything that stands, and says what was tried and what was found.
 #[derive(Debug, Parser)]
@@ -54,6 +54,15 @@ enum Part {
         /// Against its planted defects; those in the line need `--features plants`.
         #[arg(long)]
         plants: bool,
+    },
+    /// Who accepts what: ours and pymodbus.
+    Differential {
+        /// So many answers.
+        #[arg(long, default_value_t = 100_000)]
+        answers: u64,
+        /// A Python that has pymodbus.
+        #[arg(long, default_value = "python3")]
+        python: std::path::PathBuf,
     },
     /// Random worlds, judged and shrunk.
     Worlds {
@@ -116,6 +125,13 @@ fn main() -> ExitCode {
         }
         Part::Fuzz { plants: true, .. } => vec![fuzz::find_plants(seed, 20_000)],
         Part::Fuzz { seconds, .. } => vec![fuzz::run(seed, Duration::from_secs(seconds), go_on)],
+        Part::Differential { answers, python } => match differential::run(&python, seed, answers) {
+            Ok(told) => vec![told],
+            Err(error) => {
+                eprintln!("{}: {error}", python.display());
+                return ExitCode::FAILURE;
+            }
+        },
         Part::Worlds { story: Some(line), .. } => {
             let Some(story) = story::Story::read(&line) else {
                 eprintln!("{line} is no story");

@@ -41,13 +41,13 @@ pub(super) fn pdu(rng: &mut Rng) -> Vec<u8> {
 }
 
 /// One to four changes, each of a kind that finds something somewhere.
-pub(super) fn change(rng: &mut Rng, bytes: &mut Vec<u8>) {
+pub(crate) fn change(rng: &mut Rng, bytes: &mut Vec<u8>) {
     for _ in 0..rng.usize(1..5) {
         let at = rng.usize(..=bytes.len());
         match rng.u8(..7) {
             0 if at < bytes.len() => bytes[at] ^= 1 << rng.u8(..8),
             1 if at < bytes.len() => {
-                bytes[at] = [0, 1, 0x7F, 0x80, 0xFF, 0x3A, 0x0D, 0x0A, 0x10][rng.usize(..9)]
+                bytes[at] = [0, 1, 0x7F, 0x80, 0xFF, 0x3A, 0x0D, 0x0A, 0x10][rng.usize(..9)];
             }
             2 => bytes.insert(at, rng.u8(..)),
             3 if at < bytes.len() => {

@@ -161,7 +161,7 @@ fn goes_on(
 }
 
 /// The PDU of what was told, made by hand.
-fn spoken(response: &Response) -> Vec<u8> {
+pub(crate) fn spoken(response: &Response) -> Vec<u8> {
     let two =
         |function: u8, a: u16, b: u16| [&[function], &a.to_be_bytes()[..], &b.to_be_bytes()[..]].concat();
     let words = |function: u8, words: &[u16]| {

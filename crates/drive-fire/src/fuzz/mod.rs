@@ -16,6 +16,8 @@ use fastrand::Rng;
 
 use crate::report::{Find, Plant, Told};
 use broken::Defect;
+pub(crate) use bytes::change;
+pub(crate) use machines::spoken;
 
 /// What is fuzzed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

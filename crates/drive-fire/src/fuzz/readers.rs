@@ -57,7 +57,6 @@ pub(super) fn capture(rng: &mut Rng) -> Result<(), String> {
         let captured = Captured { at: Duration::from_millis(at * 7), direction, bytes: piece.into() };
         writer.write(&captured).map_err(|error| error.to_string())?;
     }
-    drop(writer);
     if rng.u8(..4) > 0 {
         change(rng, &mut file);
     }

@@ -83,7 +83,7 @@ pub fn run(seed: u64, of_each: u64, mut go_on: impl FnMut() -> bool) -> Told {
                     *outcomes.entry(format!("wrong, and nobody can tell: {why}")).or_default() += 1;
                 }
                 Lived::NotBegun => {
-                    *outcomes.entry("never came to its operation".to_owned()).or_default() += 1
+                    *outcomes.entry("never came to its operation".to_owned()).or_default() += 1;
                 }
                 Lived::NotReached => {
                     *outcomes.entry("the operation has fewer exchanges".to_owned()).or_default() += 1;
