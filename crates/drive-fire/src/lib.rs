@@ -5,6 +5,8 @@
 
 #![forbid(unsafe_code)]
 
+pub mod differential;
+pub mod fuzz;
 pub mod matrix;
 pub mod model;
 pub mod report;

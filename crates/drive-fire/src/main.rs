@@ -8,7 +8,7 @@ use std::{
 };
 
 use clap::{Parser, Subcommand};
-use drive_fire::{matrix, model, report::Told, story};
+use drive_fire::{differential, fuzz, matrix, model, report::Told, story};
 
 /// Attacks everything that stands, and says what was tried and what was found.
 #[derive(Debug, Parser)]
@@ -39,6 +39,30 @@ enum Part {
         /// Against its planted defects; those in the line need `--features plants`.
         #[arg(long)]
         plants: bool,
+    },
+    /// Whatever takes bytes or text from outside.
+    Fuzz {
+        /// For so many seconds each.
+        #[arg(long, default_value_t = 5)]
+        seconds: u64,
+        /// One target alone, with `--execution`.
+        #[arg(long, requires = "execution")]
+        target: Option<String>,
+        /// One execution alone, as a find names it.
+        #[arg(long, requires = "target")]
+        execution: Option<u64>,
+        /// Against its planted defects; those in the line need `--features plants`.
+        #[arg(long)]
+        plants: bool,
+    },
+    /// Who accepts what: ours and pymodbus.
+    Differential {
+        /// So many answers.
+        #[arg(long, default_value_t = 100_000)]
+        answers: u64,
+        /// A Python that has pymodbus.
+        #[arg(long, default_value = "python3")]
+        python: std::path::PathBuf,
     },
     /// Random worlds, judged and shrunk.
     Worlds {
@@ -90,6 +114,24 @@ fn main() -> ExitCode {
         }
         Part::Matrix { plants: true, of_each, .. } => vec![matrix::find_plants(seed, of_each as usize)],
         Part::Matrix { of_each, .. } => vec![matrix::run(seed, of_each, go_on)],
+        Part::Fuzz { target: Some(name), execution: Some(number), .. } => {
+            let known = fuzz::Target::ALL.into_iter().find(|known| format!("{known:?}") == name);
+            let Some(target) = known else {
+                eprintln!("{name} is no target: {:?}", fuzz::Target::ALL);
+                return ExitCode::FAILURE;
+            };
+            println!("{:?}", target.execute(number));
+            return ExitCode::SUCCESS;
+        }
+        Part::Fuzz { plants: true, .. } => vec![fuzz::find_plants(seed, 20_000)],
+        Part::Fuzz { seconds, .. } => vec![fuzz::run(seed, Duration::from_secs(seconds), go_on)],
+        Part::Differential { answers, python } => match differential::run(&python, seed, answers) {
+            Ok(told) => vec![told],
+            Err(error) => {
+                eprintln!("{}: {error}", python.display());
+                return ExitCode::FAILURE;
+            }
+        },
         Part::Worlds { story: Some(line), .. } => {
             let Some(story) = story::Story::read(&line) else {
                 eprintln!("{line} is no story");

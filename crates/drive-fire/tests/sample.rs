@@ -1,6 +1,8 @@
 //! A bounded sample of each part, for every change: what is here finds nothing, and finds what is planted.
 
-use drive_fire::{matrix, model, report::Told, story};
+use std::time::Duration;
+
+use drive_fire::{fuzz, matrix, model, report::Told, story};
 
 fn finds_nothing(told: &Told, least: u64) {
     println!("{told}");
@@ -21,4 +23,36 @@ fn no_story_of_the_sample_is_wrong() {
 #[test]
 fn no_small_case_of_the_master_breaks_an_invariant() {
     finds_nothing(&model::run(3, || true), 4_758);
+}
+
+#[test]
+fn nothing_that_comes_from_outside_upsets_whoever_reads_it() {
+    finds_nothing(&fuzz::run(1, Duration::from_secs(1), || true), 1_000);
+}
+
+#[test]
+fn fuzzing_finds_what_is_planted() {
+    let told = fuzz::find_plants(1, 20_000);
+    println!("{told}");
+    assert_eq!(told.plants_found(), told.plants.len(), "{told}");
+}
+
+/// With `--features plants`: most of the wrong lines are found; which live is printed.
+#[cfg(feature = "plants")]
+mod planted {
+    use super::{matrix, model};
+
+    #[test]
+    fn the_model_finds_what_is_planted() {
+        let told = model::find_plants(3);
+        println!("{told}");
+        assert!(told.plants_found() >= 10, "{told}");
+    }
+
+    #[test]
+    fn the_matrix_finds_what_is_planted() {
+        let told = matrix::find_plants(1, 250);
+        println!("{told}");
+        assert!(told.plants_found() >= 10, "{told}");
+    }
 }

@@ -90,6 +90,9 @@ impl<C> Master<C> {
     pub(super) fn next_probe(&self, now: Instant) -> Option<(u8, Instant)> {
         let (slave, at) = self.due_probe(now)?;
         let at = self.far_end.gate(false).map_or(at, |gate| gate.max(at));
+        // One that was heard late has its pause as well.
+        let at =
+            self.stations.get(&slave).and_then(|station| station.ready_at).map_or(at, |ready| ready.max(at));
         let urgent = self.schedule.any(|entry| entry.terms.class >= Class::KeepAlive);
         Some((slave, if urgent { at + AGING } else { at }))
     }

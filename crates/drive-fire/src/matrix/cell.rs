@@ -58,7 +58,7 @@ impl Plane {
 
     /// How many cells it has, those that cannot exist among them.
     #[must_use]
-    pub fn len(self) -> u64 {
+    pub fn cells(self) -> u64 {
         self.axes().iter().product()
     }
 }
@@ -94,7 +94,7 @@ impl Cell {
     /// The cell of this number; `None`: the plane has fewer.
     #[must_use]
     pub fn of(plane: Plane, number: u64) -> Option<Self> {
-        if number >= plane.len() {
+        if number >= plane.cells() {
             return None;
         }
         let mut rest = number;
@@ -151,14 +151,8 @@ impl Cell {
             .or_else(|| fault.impossible_on(way))
             .or_else(|| event.impossible_for(subject))
             .or_else(|| operation.impossible_for(subject, runs))
-            .or_else(|| match (fault, place) {
-                (Fault::None, 1..) => Some("no fault has one place"),
-                _ => None,
-            })
-            .or_else(|| match (event, amid) {
-                (Event::Nothing, true) => Some("nothing happens at one time"),
-                _ => None,
-            })
+            .or((fault == Fault::None && place > 0).then_some("no fault has one place"))
+            .or((event == Event::Nothing && amid).then_some("nothing happens at one time"))
     }
 }
 

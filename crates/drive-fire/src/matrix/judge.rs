@@ -158,15 +158,13 @@ impl Judged {
     fn judge(&self, pdu: &[u8], asked: Instant, told: &tokio_modbus::Result<Response>) {
         let writes = matches!(pdu.first(), Some(6 | 16));
         match told {
-            Ok(Ok(Response::ReadHoldingRegisters(words) | Response::ReadInputRegisters(words))) => {
-                if !self.is_true(pdu, asked, words) {
-                    self.object(&format!("a value that the machine did not give: {words:04X?}"), pdu);
-                }
+            Ok(Ok(Response::ReadHoldingRegisters(words) | Response::ReadInputRegisters(words)))
+                if !self.is_true(pdu, asked, words) =>
+            {
+                self.object(&format!("a value that the machine did not give: {words:04X?}"), pdu);
             }
-            Ok(Ok(_)) if writes && self.bench.way != Way::UniTelway => {
-                if self.taken(pdu, asked).is_empty() {
-                    self.object("confirmed, and never taken by the machine", pdu);
-                }
+            Ok(Ok(_)) if writes && self.bench.way != Way::UniTelway && self.taken(pdu, asked).is_empty() => {
+                self.object("confirmed, and never taken by the machine", pdu);
             }
             Err(error) if writes && self.bench.way != Way::UniTelway => {
                 let said_unsent = matches!(error, tokio_modbus::Error::Transport(error) if error

@@ -40,7 +40,7 @@ pub fn drive_of(subject: Subject) -> Box<drive_testing::contract::Open> {
 
 /// The cells of a plane in an order in which neighbours have nothing in common, each once; the same seed, the same order.
 pub fn shuffled(plane: Plane, seed: u64) -> impl Iterator<Item = Cell> {
-    let len = plane.len();
+    let len = plane.cells();
     // A permutation of as many numbers as the next power of four holds, in four rounds; what is beyond the plane is passed over.
     let half = (64 - (len.max(2) - 1).leading_zeros()).div_ceil(2);
     let mask = (1_u64 << half) - 1;
@@ -83,7 +83,7 @@ pub fn run(seed: u64, of_each: u64, mut go_on: impl FnMut() -> bool) -> Told {
                     *outcomes.entry(format!("wrong, and nobody can tell: {why}")).or_default() += 1;
                 }
                 Lived::NotBegun => {
-                    *outcomes.entry("never came to its operation".to_owned()).or_default() += 1
+                    *outcomes.entry("never came to its operation".to_owned()).or_default() += 1;
                 }
                 Lived::NotReached => {
                     *outcomes.entry("the operation has fewer exchanges".to_owned()).or_default() += 1;
@@ -106,15 +106,15 @@ pub fn run(seed: u64, of_each: u64, mut go_on: impl FnMut() -> bool) -> Told {
 pub fn census(sample: u64) -> Vec<String> {
     let mut lines = Vec::new();
     for plane in Plane::ALL {
-        let looked = plane.len().min(sample);
+        let looked = plane.cells().min(sample);
         let mut why = BTreeMap::<&str, u64>::new();
         for cell in shuffled(plane, 1).take(looked as usize) {
             *why.entry(cell.cannot_exist().unwrap_or("can exist")).or_default() += 1;
         }
         let share =
-            |count: u64| (u128::from(count) * u128::from(plane.len()) / u128::from(looked.max(1))) as u64;
-        let counted = if looked < plane.len() { "about " } else { "" };
-        lines.push(format!("{plane:?}: {} cells", plane.len()));
+            |count: u64| (u128::from(count) * u128::from(plane.cells()) / u128::from(looked.max(1))) as u64;
+        let counted = if looked < plane.cells() { "about " } else { "" };
+        lines.push(format!("{plane:?}: {} cells", plane.cells()));
         lines.extend(
             why.into_iter().map(|(why, count)| format!("{:>12} {why}", format!("{counted}{}", share(count)))),
         );
@@ -131,7 +131,7 @@ mod tests {
     #[test]
     fn a_plane_is_shuffled_without_losing_or_doubling_a_cell() {
         let numbers: BTreeSet<u64> = shuffled(Plane::Events, 3).map(|cell| cell.number).collect();
-        assert_eq!(numbers.len() as u64, Plane::Events.len());
+        assert_eq!(numbers.len() as u64, Plane::Events.cells());
         let first = |seed| shuffled(Plane::All, seed).next().map(|cell| cell.number);
         assert_eq!(first(1), first(1));
         assert_ne!(first(1), first(2));

@@ -315,7 +315,7 @@ impl Cable {
                 return true;
             }
             Fault::ForeignInstead => {
-                answer = changed(&|cut| cut.slave = cut.slave.wrapping_add(1)).unwrap_or_default()
+                answer = changed(&|cut| cut.slave = cut.slave.wrapping_add(1)).unwrap_or_default();
             }
             Fault::Double(ms) => self.due.push((later(ms), answer.clone())),
             Fault::ReplayBefore => {

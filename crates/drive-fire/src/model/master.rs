@@ -64,19 +64,19 @@ use Step as S;
 impl Step {
     /// All of them.
     pub const ALL: [Self; 13] = [
-        S::Stop,
-        S::Command,
-        S::Edge,
-        S::Setpoint,
-        S::Read,
-        S::Neighbour,
-        S::Drop,
-        S::Answer,
-        S::Lose,
-        S::Damage,
-        S::Refuse,
-        S::ComesLate,
-        S::Wait,
+        Self::Stop,
+        Self::Command,
+        Self::Edge,
+        Self::Setpoint,
+        Self::Read,
+        Self::Neighbour,
+        Self::Drop,
+        Self::Answer,
+        Self::Lose,
+        Self::Damage,
+        Self::Refuse,
+        Self::ComesLate,
+        Self::Wait,
     ];
 }
 
@@ -104,11 +104,7 @@ impl Setting {
                 ..LineConfig::stream(SERIAL)
             },
             Self::Gateway => LineConfig {
-                gateway: Some(Gateway {
-                    at_once: Some(1),
-                    wait: Some(Duration::from_secs(1)),
-                    ..Gateway::default()
-                }),
+                gateway: Some(Gateway { at_once: Some(1), wait: Some(Duration::from_secs(1)) }),
                 offline_after: 2,
                 retries: 1,
                 ..LineConfig::stream(SERIAL)
@@ -230,10 +226,10 @@ impl World {
                 self.ask(1, write, Terms::of(Class::Command).within(LIFETIME).replacing(1))?;
             }
             S::Read => {
-                self.ask(1, Request::ReadHoldingRegisters(7, 2), Terms::of(Class::Status).sparing(3))?
+                self.ask(1, Request::ReadHoldingRegisters(7, 2), Terms::of(Class::Status).sparing(3))?;
             }
             S::Neighbour => {
-                self.ask(2, Request::ReadHoldingRegisters(7, 2), Terms::of(Class::Status).sparing(3))?
+                self.ask(2, Request::ReadHoldingRegisters(7, 2), Terms::of(Class::Status).sparing(3))?;
             }
             S::Drop => {
                 let last = self.calls.values_mut().next_back().filter(|call| call.outcome.is_none());
@@ -430,15 +426,15 @@ impl World {
             .max();
         let reads = pdu[0] == 3;
         let is_it =
-            |call: &&mut Call| call.slave == slave && if reads { call.pdu[0] == 3 } else { call.pdu == pdu };
+            |call: &Call| call.slave == slave && if reads { call.pdu[0] == 3 } else { call.pdu == pdu };
         // Equal calls are told apart by nothing: whichever may still be sent.
         let found = self
             .calls
             .iter_mut()
-            .filter(|(_, call)| call.outcome.is_none() && is_it(&call))
+            .filter(|(_, call)| call.outcome.is_none() && is_it(call))
             .min_by_key(|(_, call)| call.sent.len());
         let Some((&id, call)) = found else {
-            let told = self.calls.values_mut().any(|mut call| is_it(&&mut call) && call.outcome.is_some());
+            let told = self.calls.values().any(|call| is_it(call) && call.outcome.is_some());
             // A probe reads by itself, and a stop that nobody waits for goes on.
             return if told && !reads && !is_stop {
                 Err("what has ended is not sent again")
@@ -477,6 +473,10 @@ impl World {
                 return Err("a call ends once");
             }
             let writes = call.pdu[0] == 6;
+            let asked = call.sent.last().copied();
+            if outcome.is_ok() && asked.is_some_and(|asked| self.master.asked_at() > asked) {
+                return Err("a value is no younger than its question");
+            }
             match &outcome {
                 Ok(Ok(Response::ReadHoldingRegisters(words))) => {
                     let number = words[0] / 16;
@@ -529,9 +529,6 @@ impl World {
         Ok(())
     }
 }
-
-/// Every invariant that is held here.
-pub const INVARIANTS: usize = 19;
 
 /// What was explored.
 #[derive(Debug, Clone, Default)]

@@ -1,0 +1,147 @@
+//! Fuzzing: honest loops over whatever takes bytes or text from outside, from corpora of frames that manuals print. No coverage guides
+//! them; each target has something to hold what comes out against, besides that nothing panics and everything ends.
+
+mod broken;
+mod bytes;
+mod machines;
+mod readers;
+
+use std::{
+    collections::BTreeMap,
+    panic,
+    time::{Duration, Instant},
+};
+
+use fastrand::Rng;
+
+use crate::report::{Find, Plant, Told};
+use broken::Defect;
+pub(crate) use bytes::change;
+pub(crate) use machines::spoken;
+
+/// What is fuzzed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Target {
+    /// The exchange of Modbus RTU, in any chunks at any times.
+    Rtu,
+    /// That of Modbus ASCII.
+    Ascii,
+    /// That of Modbus TCP.
+    Mbap,
+    /// That of UNI-TELWAY.
+    UniTelway,
+    /// The ear that only listens to a line, in each protocol.
+    Ear,
+    /// The reader of captures.
+    Capture,
+    /// Profiles.
+    Profile,
+    /// Lines of text to the simulator.
+    Control,
+    /// Addresses, settings, lines and setpoints as people write them.
+    Words,
+}
+
+impl Target {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Rtu,
+        Self::Ascii,
+        Self::Mbap,
+        Self::UniTelway,
+        Self::Ear,
+        Self::Capture,
+        Self::Profile,
+        Self::Control,
+        Self::Words,
+    ];
+
+    /// One execution with the numbers of a seed.
+    ///
+    /// # Errors
+    /// What does not hold.
+    pub fn execute(self, seed: u64) -> Result<(), String> {
+        self.execute_with(seed, None)
+    }
+
+    fn execute_with(self, seed: u64, defect: Option<Defect>) -> Result<(), String> {
+        let mut rng = Rng::with_seed(seed);
+        let run = panic::AssertUnwindSafe(|| match self {
+            Self::Rtu | Self::Ascii | Self::Mbap | Self::UniTelway => {
+                machines::execute(self, &mut rng, defect)
+            }
+            Self::Ear => readers::ear(&mut rng),
+            Self::Capture => readers::capture(&mut rng),
+            Self::Profile => readers::profile(&mut rng),
+            Self::Control => readers::control(&mut rng),
+            Self::Words => readers::words(&mut rng),
+        });
+        panic::catch_unwind(run).unwrap_or_else(|panic| {
+            let said = panic.downcast_ref::<String>().cloned();
+            let said = said.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));
+            Err(format!("a panic: {}", said.unwrap_or_default()))
+        })
+    }
+}
+
+/// Fuzzes each target for so long.
+pub fn run(seed: u64, of_each: Duration, mut go_on: impl FnMut() -> bool) -> Told {
+    let begun = Instant::now();
+    let mut told = Told::new("fuzzing", "executions");
+    for target in Target::ALL {
+        let (began, mut count, mut whys) = (Instant::now(), 0, BTreeMap::new());
+        while began.elapsed() < of_each && go_on() {
+            let number = seed.wrapping_mul(1_000_000_007).wrapping_add(count);
+            count += 1;
+            if let Err(why) = target.execute(number) {
+                // One of each kind: what follows the first words is its data.
+                let kind: String = why.chars().take(40).collect();
+                whys.entry(kind).or_insert((number, why));
+            }
+        }
+        told.count += count;
+        told.details.push(format!("{count:>9} {target:?}"));
+        for (number, why) in whys.into_values() {
+            let replay = format!("drive-fire fuzz --target {target:?} --execution {number}");
+            told.finds.push(Find { what: format!("{target:?}: {why}"), replay });
+        }
+    }
+    told.took = begun.elapsed();
+    told
+}
+
+/// Fuzzes each planted defect until it is found, at most so often; those of the line with the feature `plants`.
+pub fn find_plants(seed: u64, at_most: u64) -> Told {
+    let begun = Instant::now();
+    let mut told = Told::new("fuzzing, against planted defects", "executions");
+    let machines = [Target::Rtu, Target::Ascii, Target::Mbap, Target::UniTelway];
+    let mut attack = |name: String, targets: &[Target], defect| {
+        let tries = (0..at_most).flat_map(|number| targets.iter().map(move |target| (number, *target)));
+        let mut found_by = None;
+        for (number, target) in tries {
+            told.count += 1;
+            if let Err(why) = target.execute_with(seed.wrapping_add(number), defect) {
+                found_by = Some(format!("{target:?} at execution {number}: {why}"));
+                break;
+            }
+        }
+        told.plants.push(Plant { name, found_by });
+    };
+    for defect in Defect::ALL {
+        attack(format!("machine: {defect:?}"), &machines, Some(defect));
+    }
+    #[cfg(feature = "plants")]
+    for mutant in [
+        "another-slaves-answer",
+        "crc-unchecked",
+        "lrc-unchecked",
+        "transaction-unchecked",
+        "confirmed-value-unchecked",
+        "confirmed-address-unchecked",
+    ] {
+        let _chosen = drive_bus::mutants::choose(mutant);
+        attack(format!("line: {mutant}"), &machines, None);
+    }
+    told.took = begun.elapsed();
+    told
+}
