@@ -26,6 +26,9 @@ pub enum Holds {
     Distinct,
 }
 
+/// A register and its word.
+type Held = (&'static Row, u16);
+
 impl Relation {
     /// The registers that break it with what is held; `None` where it holds. What is not known breaks nothing.
     #[must_use]
@@ -36,12 +39,12 @@ impl Relation {
     ) -> Option<Vec<&'static Row>> {
         let rows =
             self.registers.iter().filter_map(|&address| rows.iter().find(|row| row.address == address));
-        let known: Vec<(&Row, u16)> = rows.filter_map(|row| Some((row, held(row.address)?))).collect();
-        let number = |(row, word): &(&Row, u16)| {
+        let known: Vec<Held> = rows.filter_map(|row| Some((row, held(row.address)?))).collect();
+        let number = |(row, word): &Held| {
             let is_number = row.choice(*word).is_none();
             is_number.then(|| i64::from(row.unit.number(*word)))
         };
-        let pair_where = |breaks: &dyn Fn(&[(&'static Row, u16)]) -> bool| {
+        let pair_where = |breaks: &dyn Fn(&[Held]) -> bool| {
             let pair = known.windows(2).find(|pair| breaks(pair))?;
             Some(pair.iter().map(|(row, _)| *row).collect())
         };
@@ -66,7 +69,7 @@ impl Relation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::registers::{Choice, Range};
+    use crate::registers::Choice;
 
     const NOT_SET: &[Choice] = &[Choice::new(65_535, "nO", "not set")];
 
