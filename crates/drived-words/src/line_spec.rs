@@ -72,7 +72,11 @@ impl FromStr for LineSpec {
     type Err = LineSpecError;
 
     fn from_str(text: &str) -> Result<Self, LineSpecError> {
-        Ok(Self(meant(text).parse()?))
+        let text = meant(text);
+        text.parse().map(Self).map_err(|error| match meant::format(&text) {
+            Some(format) => LineSpecError::Meant(error, format),
+            None => LineSpecError::Text(error),
+        })
     }
 }
 
@@ -197,6 +201,8 @@ fn agreed<T: PartialEq + fmt::Display>(
 pub enum LineSpecError {
     #[error(transparent)]
     Text(#[from] LineTextError),
+    #[error("{0}: did you mean {1}?")]
+    Meant(LineTextError, String),
     #[error(transparent)]
     FarEnd(#[from] FarEndError),
     #[error(transparent)]

@@ -15,7 +15,7 @@ use crate::{
 pub fn wanted(row: &Row, text: &str) -> Result<u16, Failure> {
     let refuse = |why: String| Failure::Input(format!("{} ({}): {why}", row.code, row.address));
     if !row.access.is_writable() {
-        return Err(refuse("the register can only be read".to_owned()));
+        return Err(refuse("the register can only be read, which drived param get does".to_owned()));
     }
     let expected = || match range(row) {
         range if range.is_empty() => "a number in its unit or a hexadecimal word such as 0627h".to_owned(),

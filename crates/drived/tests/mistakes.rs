@@ -18,8 +18,7 @@ enum Ends {
 
 use Ends::{Answered, Understood};
 
-/// The mistakes by their numbers. `LINE` is the port of the simulated drives, `CAPTURE` a capture, `@` between words a space that
-/// belongs to a word.
+/// The mistakes by their numbers. `LINE` is the port of simulated drives set up for the bus, `FACTORY` that of one in its factory setting, `CAPTURE` a capture, `~` a space inside a word.
 const MISTAKES: [(u32, &str, Ends); 55] = [
     (
         1,
@@ -33,7 +32,11 @@ const MISTAKES: [(u32, &str, Ends); 55] = [
     (6, "scan --line /tmp,19200,8E1", Answered(2, &["/tmp is a folder and no serial port", "present"])),
     (7, "scan LINE", Answered(2, &["did you mean --line LINE?"])),
     (8, "scan -l LINE,19200,8E1", Answered(2, &["did you mean --line?"])),
-    (9, "scan --line LINE,19200,E81", Answered(2, &["\"E81\" is not a character format", "as in 8E1"])),
+    (
+        9,
+        "scan --line LINE,19200,E81",
+        Answered(2, &["\"E81\" is not a character format", "did you mean 8E1?"]),
+    ),
     (10, "scan --line LINE,19200,8e1 --addresses 1", Understood(0, "1 of 1 address answer")),
     (11, "scan --line LINE:19200:8E1 --addresses 1", Understood(0, "1 of 1 address answer")),
     (12, "scan --line LINE,19.2k,8E1 --addresses 1", Understood(0, "1 of 1 address answer")),
@@ -85,7 +88,11 @@ const MISTAKES: [(u32, &str, Ends); 55] = [
         Understood(0, "holds the setpoint 30.50 Hz"),
     ),
     (32, "setpoint --line LINE,19200,8E1 --drive atv312@1 -30Hz", Answered(2, &["no sign", "type 30Hz"])),
-    (33, "setpoint --line LINE,19200,8E1 --drive atv312@1 1500rpm", Understood(1, "1500 rpm")),
+    (
+        33,
+        "setpoint --line LINE,19200,8E1 --drive atv312@1 1500rpm",
+        Understood(0, "holds the setpoint 1500 rpm"),
+    ),
     (34, "param get --line LINE,19200,8E1 --drive atv312@1 acc", Understood(0, "ACC")),
     (
         35,
@@ -141,7 +148,7 @@ const MISTAKES: [(u32, &str, Ends); 55] = [
         "param restore CAPTURE --line LINE,19200,8E1",
         Answered(2, &["it is a capture and no backup", "drived explain"]),
     ),
-    (53, "start --line LINE,19200,8E1 --drive atv312@2", Answered(1, &["refused", "SA2"])),
+    (53, "start --line FACTORY,19200,8E1 --drive atv312@1", Answered(1, &["refused", "SA2"])),
     (54, "completions powershell", Answered(2, &["[possible values: bash, zsh, fish]"])),
     (55, "plan --line LINE,19200,8E1 --drive atv312@1-40", Answered(2, &["share the drives among lines"])),
 ];
@@ -149,13 +156,18 @@ const MISTAKES: [(u32, &str, Ends); 55] = [
 #[test]
 fn every_mistake_of_a_tired_person_is_understood_or_answered_on_one_line() {
     let sim = Sim::serve_with("mistakes", &["atv312@1-3"], &[]);
+    let factory = Sim::serve_with("mistakes-factory", &["atv312@1"], &["--factory"]);
     let capture = path("mistakes.pcapng");
     fs::write(&capture, [&[0x0A, 0x0D, 0x0D, 0x0A][..], &[0xFF; 24]].concat()).expect("it can be written");
     let capture_name = capture.to_str().expect("the path is text");
-    // At each address a drive as the simulator sets it up for the bus, but the second as it leaves the factory.
+    let mut wrong = Vec::new();
     for (number, typed, ends) in &MISTAKES {
-        let here =
-            |text: &str| text.replace("LINE", sim.link()).replace("CAPTURE", capture_name).replace('~', " ");
+        let here = |text: &str| {
+            text.replace("LINE", sim.link())
+                .replace("FACTORY", factory.link())
+                .replace("CAPTURE", capture_name)
+                .replace('~', " ")
+        };
         let words: Vec<String> = typed.split(' ').map(here).collect();
         let ended = run(&words.iter().map(String::as_str).collect::<Vec<_>>());
         println!(
@@ -164,16 +176,20 @@ fn every_mistake_of_a_tired_person_is_understood_or_answered_on_one_line() {
             ended.err,
             if ended.err.is_empty() { "understood\n" } else { "" }
         );
-        match ends {
+        let is_as_told = match ends {
             Answered(code, reasons) => {
-                reasons.iter().for_each(|reason| ended.assert_refused(*code, &here(reason)));
+                let is_line = ended.err.starts_with("drived: ") && ended.err.lines().count() == 1;
+                let says = |reason: &&str| ended.err.contains(&here(reason));
+                ended.code == Some(*code) && is_line && reasons.iter().all(says)
             }
             Understood(code, told) => {
-                assert_eq!(ended.code, Some(*code), "{number}: {ended:?}");
-                let all = format!("{}{}", ended.out, ended.err);
-                assert!(all.contains(told), "{number}: {ended:?}");
+                ended.code == Some(*code) && format!("{}{}", ended.out, ended.err).contains(told)
             }
+        };
+        if !is_as_told {
+            wrong.push((number, ended));
         }
     }
     let _ = fs::remove_file(capture);
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }

@@ -174,6 +174,22 @@ fn a_line_of_its_own_has_a_stop_key_too_and_a_stop_that_is_not_confirmed_ends_wi
 }
 
 #[test]
+fn it_draws_what_the_terminal_has_and_ends_in_order_with_it() {
+    let sim = Sim::serve("monitor-plain", &["atv312@1"]);
+    let arguments = ["monitor", "--line", sim.link(), "--drive", "atv312@1"];
+    let mut monitor = Terminal::start(drived(&arguments).env("LANG", "C"), 80, 24);
+    let screen =
+        monitor.wait_until("a live drive", |screen| screen.contains("0.0 A") && screen.contains("live"));
+    assert!(screen.is_ascii(), "{screen}");
+    monitor.hang_up();
+    let (code, screen, is_given_back) = monitor.end();
+    assert_eq!((code, is_given_back), (Some(0), true), "{screen}");
+    let dumb = Terminal::start(drived(&arguments).env("TERM", "dumb"), 80, 24);
+    let (code, screen, _) = dumb.end();
+    assert!(code == Some(2) && screen.contains("drived watch prints what happens"), "{code:?} {screen}");
+}
+
+#[test]
 fn without_a_terminal_it_is_refused_and_told_what_to_use() {
     run(&["monitor"]).assert_refused(2, "needs a terminal for its picture and its keys: drived watch prints");
 }

@@ -26,7 +26,7 @@ pub enum Holds {
     Distinct,
 }
 
-/// A register and the word that it holds.
+/// A register and its word.
 type Held = (&'static Row, u16);
 
 impl Relation {

@@ -130,6 +130,9 @@ fn each(reader: &mut dyn PcapReaderIterator, mut take: impl FnMut(PcapBlockOwned
     }
 }
 
+/// One way of a connection: address and port of who sends, and of whom it is for.
+type Way = (Vec<u8>, u16, Vec<u8>, u16);
+
 /// What is made of packets.
 #[derive(Default)]
 struct Packets {
@@ -137,7 +140,7 @@ struct Packets {
     tcp: Vec<Captured>,
     other: Vec<Captured>,
     /// Of each connection and way: the next number of a byte, and what makes no frame yet.
-    streams: BTreeMap<(Vec<u8>, u16, Vec<u8>, u16), (u32, Vec<u8>)>,
+    streams: BTreeMap<Way, (u32, Vec<u8>)>,
     /// Packets in which no frame was found.
     passed_over: usize,
 }

@@ -98,7 +98,7 @@ fn a_classic_capture_of_a_serial_line_is_read_in_both_orders_and_resolutions() {
         for cut in 24..file.len() {
             match read(&file[..cut], false) {
                 Ok(taken) => {
-                    assert!(taken.notes.iter().any(|note| note.contains("cut off")) || cut == 48, "{cut}")
+                    assert!(taken.notes.iter().any(|note| note.contains("cut off")) || cut == 48, "{cut}");
                 }
                 Err(why) => assert!(!why.is_empty()),
             }

@@ -49,6 +49,17 @@ fn by_colons(text: &str) -> Vec<String> {
     }
 }
 
+/// The character format whose signs stand in another order in this line: `E81` for `8E1`.
+pub(super) fn format(line: &str) -> Option<String> {
+    let mixed = line.split(',').skip(1).find(|part| part.len() == 3 && !is_format(part))?;
+    let one_of = |signs: &str| {
+        let mut found =
+            mixed.chars().map(|sign| sign.to_ascii_uppercase()).filter(|sign| signs.contains(*sign));
+        found.next().filter(|_| found.next().is_none())
+    };
+    Some([one_of("78")?, one_of("NEO")?, one_of("12")?].iter().collect())
+}
+
 fn is_format(text: &str) -> bool {
     text.parse::<CharacterFormat>().is_ok()
 }
@@ -68,6 +79,15 @@ mod tests {
             ("rtu+tcp://plant:4001:9600:8N1", "rtu+tcp://plant:4001,9600,8N1"),
         ] {
             assert_eq!(meant(text), line);
+        }
+    }
+
+    #[test]
+    fn a_format_in_another_order_is_asked_about() {
+        assert_eq!(format("COM3,19200,E81").as_deref(), Some("8E1"));
+        assert_eq!(format("COM3,9600,n18").as_deref(), Some("8N1"));
+        for line in ["COM3,19200,8E1", "COM3,300,9X9", "COM3,300", "E81"] {
+            assert_eq!(format(line), None, "{line}");
         }
     }
 

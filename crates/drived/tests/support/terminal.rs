@@ -40,13 +40,17 @@ impl Terminal {
         // setsid makes it the controlling terminal, so that Ctrl-C is a signal.
         let mut session = Command::new("setsid");
         session.arg("--ctty").arg("--wait").arg(command.get_program()).args(command.get_args());
+        session
+            .env("TERM", "xterm-256color")
+            .env("LANG", "C.UTF-8")
+            .env_remove("LC_ALL")
+            .env_remove("LC_CTYPE");
         for (name, value) in command.get_envs() {
             match value {
                 Some(value) => session.env(name, value),
                 None => session.env_remove(name),
             };
         }
-        session.env("TERM", "xterm-256color");
         let child = session.stdin(its()).stdout(its()).stderr(its()).spawn().expect("setsid runs");
         let (tell, said) = channel();
         let mut heard = File::from(master);
@@ -61,6 +65,16 @@ impl Terminal {
         });
         let screen = Screen::new(columns.into(), rows.into());
         Self { child, keys, end: end.into(), said, screen }
+    }
+
+    /// Tells the program that its terminal is gone.
+    pub(crate) fn hang_up(&self) {
+        let session = self.child.id();
+        let children = std::fs::read_to_string(format!("/proc/{session}/task/{session}/children"));
+        let children = children.expect("Linux tells them");
+        let program = children.split_whitespace().next().map_or_else(|| session.to_string(), str::to_owned);
+        let told = Command::new("kill").args(["-HUP", &program]).status().expect("kill starts");
+        assert!(told.success());
     }
 
     /// Types this.

@@ -120,8 +120,10 @@ fn state(drive: &DriveTold) -> Markup {
 fn read(quality: Freshness, at: Option<Instant>) -> Markup {
     let age = at.map(|at| output::age(at.elapsed()));
     match (quality, age) {
-        (Freshness::Fresh, Some(age)) => html! { (age) " before this report" },
-        (Freshness::Stale, Some(age)) => html! { strong { "NOT LIVE: " } (age) " before this report" },
+        (Freshness::Fresh, Some(age)) => html! { (age) (own(" before this report")) },
+        (Freshness::Stale, Some(age)) => {
+            html! { strong { (own("NOT LIVE: ")) } (age) (own(" before this report")) }
+        }
         (_, _) => unread("the drive has not told it since the program started"),
     }
 }
@@ -239,13 +241,13 @@ fn faults(drive: &DriveTold) -> Markup {
     html! {
         @for fault in &trips { (present(*fault, by_watchdog)) }
         @if trips.is_empty() { p { (own("No fault is present.")) } }
-        @if let Some(trip) = trip { p { "The program saw it at " (moment(trip.time_unix_ms)) "." } }
+        @if let Some(trip) = trip { p { (own("The program saw it at ")) (moment(trip.time_unix_ms)) "." } }
         @match faults.reset_allowed {
             Some(true) if !faults.present.is_empty() => p { (own("The drive would accept a reset.")) },
             Some(false) => p { (own("The drive would not accept a reset: its cause is still there.")) },
             _ => {},
         }
-        @for warning in &faults.warnings { p.alarm { "Alarm without a trip: " (warning) } }
+        @for warning in &faults.warnings { p.alarm { (own("Alarm without a trip: ")) (warning) } }
         @if kept == 0 { p.untold { (own("This family keeps no history of faults.")) } }
         @else if faults.history.is_empty() { p { (own("The history of the drive is empty.")) } }
         @else {
@@ -258,7 +260,7 @@ fn present(fault: Option<Fault>, by_watchdog: bool) -> Markup {
     let remedy = fault.and_then(|fault| fault.remedy()).unwrap_or("see the manual of the drive");
     html! {
         div.trip {
-            p { strong { (own("Tripped: ")) (values::tripped(fault.as_ref())) } @if by_watchdog { ", by the communication watchdog" } }
+            p { strong { (own("Tripped: ")) (values::tripped(fault.as_ref())) } @if by_watchdog { (own(", by the communication watchdog")) } }
             p { (own("What to do: ")) (remedy) }
         }
     }

@@ -196,6 +196,17 @@ const WORDS: &[(&str, &str)] = &[
     ),
     ("Nothing was changed.", "Rien n’a été modifié."),
     ("No backup from before has this drive.", "Aucune sauvegarde d’avant ne contient ce variateur."),
+    (
+        "the line itself, watched for this report; nothing was written to it",
+        "la ligne elle-même, observée pour ce rapport ; rien n’y a été écrit",
+    ),
+    ("the running daemon", "le démon en marche"),
+    ("whose drives are simulated", "dont les variateurs sont simulés"),
+    ("The program saw it at ", "Le programme l’a vu à "),
+    ("Alarm without a trip: ", "Alarme sans déclenchement : "),
+    (" before this report", " avant ce rapport"),
+    ("NOT LIVE: ", "PAS ACTUEL : "),
+    (", by the communication watchdog", ", par la surveillance de la communication"),
     ("place and date", "lieu et date"),
     (
         "Counts begin when the daemon began, or when the line was opened; hours and energy are the drive's own.",

@@ -87,7 +87,7 @@ impl Page<'_> {
             ("written".to_owned(), html! { (self.written.format("%Y-%m-%d %H:%M:%S %:z")) }),
             (
                 "told by".to_owned(),
-                html! { (self.source) @if daemon.demo { ", " strong { "whose drives are simulated" } } },
+                html! { (own(self.source)) @if daemon.demo { ", " strong { (own("whose drives are simulated")) } } },
             ),
             (
                 "running since".to_owned(),

@@ -65,7 +65,7 @@ fn html(gathered: &Gathered) -> String {
         notes: &notes,
         parties: Parties { customer: Some("Mill & Sons"), technician: Some("A. Turner") },
         before: None,
-        source: "a test",
+        source: super::THE_LINE,
         written,
         gathered,
     }
@@ -266,7 +266,7 @@ async fn what_was_changed_since_a_backup_stands_with_both_values() {
         notes: &[],
         parties: Parties::default(),
         before: Some(&backups),
-        source: "a test",
+        source: super::THE_LINE,
         written: Local::now().fixed_offset(),
         gathered: &now,
     };

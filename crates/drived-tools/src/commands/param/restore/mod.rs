@@ -169,7 +169,10 @@ async fn restore(
             path.display()
         )));
     }
-    let plan = Plan::of(file, &now, args.with_communication)?;
+    let plan = Plan::of(file, &now, args.with_communication).map_err(|failure| match failure {
+        Failure::Input(why) => Failure::Input(format!("{}: {why}", path.display())),
+        failure => failure,
+    })?;
     let by_hand = plan.by_hand(file, &now);
     if let Some(why) = by_hand.as_ref().filter(|_| args.write && !args.other_macro) {
         return Err(Failure::Input(format!(
@@ -227,7 +230,7 @@ async fn restore(
                 text.extend(how);
             }
             Err(why) => {
-                failure = Some((Failure::Drive(format!("all is written, and not saved: {why}")), false))
+                failure = Some((Failure::Drive(format!("all is written, and not saved: {why}")), false));
             }
         }
     } else if args.save {
