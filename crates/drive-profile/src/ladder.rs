@@ -88,9 +88,9 @@ impl<'a> Ladder<'a> {
         self.sound(Level::Stop, "the line and its functions", &link.source);
         let stops: Vec<_> = file.actions().filter(|(name, _)| name.starts_with("stop.")).collect();
         if stops.is_empty() {
-            self.keep(
+            self.ask(
                 Level::Stop,
-                0,
+                "ramp",
                 "no stop of one write is known",
                 "which one word stops it, whatever it does?",
             );
@@ -107,7 +107,7 @@ impl<'a> Ladder<'a> {
             let mut shows = file.state.is.iter().filter(|is| is.get_ref().state == state).peekable();
             if shows.peek().is_none() {
                 let question = "which bits, or which number, of which register?";
-                self.keep(Level::Motion, 0, &format!("nothing shows {name}"), question);
+                self.ask(Level::Motion, "is", &format!("nothing shows {name}"), question);
             }
         }
         for is in &file.state.is {
@@ -126,9 +126,9 @@ impl<'a> Ladder<'a> {
         let see = &self.file.see;
         let ways: Vec<_> = [&see.output, &see.setpoint].into_iter().filter_map(Answer::given).collect();
         if ways.is_empty() {
-            self.keep(
+            self.ask(
                 Level::Motion,
-                0,
+                "output",
                 "neither its setpoint nor its output can be seen",
                 "which register holds the output frequency?",
             );
@@ -197,18 +197,18 @@ impl<'a> Ladder<'a> {
                     );
                 }
             }
-            None => self.keep(
+            None => self.ask(
                 Level::Motion,
-                0,
+                "command",
                 "which words run it is not known",
                 "which bits of which register run it?",
             ),
         }
         match file.start.forward.given() {
             Some(start) => self.action(Level::Motion, "start.forward", start),
-            None => self.keep(
+            None => self.ask(
                 Level::Motion,
-                0,
+                "forward",
                 "how it is started is not known",
                 "what is written, in which order?",
             ),
@@ -225,17 +225,17 @@ impl<'a> Ladder<'a> {
                 }
             }
             Answer::None => {}
-            Answer::Unknown => self.keep(
+            Answer::Unknown => self.ask(
                 Level::Motion,
-                0,
+                "ladder",
                 "whether something has to be written before the run command is not known",
                 "from which states does a run command act?",
             ),
         }
         if file.stop.ramp.given().is_none() {
-            self.keep(
+            self.ask(
                 Level::Motion,
-                0,
+                "ramp",
                 "no stop along the ramp is known",
                 "which one word stops it along its ramp?",
             );
@@ -246,7 +246,12 @@ impl<'a> Ladder<'a> {
                 self.register(Level::Motion, setpoint.get_ref().register.get_ref());
             }
             None => {
-                self.keep(Level::Motion, 0, "its setpoint is not known", "which register, in which unit?");
+                self.ask(
+                    Level::Motion,
+                    "setpoint",
+                    "its setpoint is not known",
+                    "which register, in which unit?",
+                );
             }
         }
         match &file.reset {
@@ -267,9 +272,9 @@ impl<'a> Ladder<'a> {
                 }
             }
             Answer::None => {}
-            Answer::Unknown => self.keep(
+            Answer::Unknown => self.ask(
                 Level::Motion,
-                0,
+                "guards",
                 "whether a setting of the drive changes what its words mean is not known",
                 "which parameters choose its protocol, profile or map, and what do they have to hold?",
             ),
@@ -284,9 +289,7 @@ impl<'a> Ladder<'a> {
             .chain(setpoint.and_then(|register| file.place(register)))
             .any(|(space, address)| space == Space::HoldingRegister && SHARED.contains(&address));
         if shared && !told && !self.is_tried() {
-            self.keep(
-                Level::Motion,
-                0,
+            self.ask(Level::Motion, "fingerprints",
                 "its command stands where other makers have other words, and nothing tells this drive from theirs",
                 "which register only this drive reads so? Or a person tries it on the drive, by name, under [[tried]]",
             );
@@ -379,6 +382,24 @@ impl<'a> Ladder<'a> {
                 "what does the maker's manual say, on which page?",
             );
         }
+    }
+
+    /// Where a question stands in the file.
+    fn of(&self, key: &str) -> usize {
+        let mut at = 0;
+        for line in self.text.split_inclusive('\n') {
+            let asked = line.strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='));
+            if asked || line.trim_end() == format!("[{key}]") {
+                return at;
+            }
+            at += line.len();
+        }
+        0
+    }
+
+    /// What keeps from a level until a question of the file is answered.
+    fn ask(&mut self, level: Level, key: &str, what: &str, question: &str) {
+        self.keep(level, self.of(key), what, question);
     }
 
     fn keep(&mut self, level: Level, at: usize, what: &str, question: &str) {

@@ -10,6 +10,7 @@ use drive_sim::{
     Act, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Ramp, Ramps, Rules, Surroundings,
 };
 
+use self::bits::Places;
 use crate::{
     drive::{Words, counts, hundredths},
     format::{Access, Bits, Guard, Order, Register, Space, UnitName},
@@ -399,9 +400,19 @@ fn hertz(register: &Register) -> Option<[i64; 2]> {
     }
 }
 
-impl Machine {
+impl Places for Machine {
     fn has_function(&self, function: u8) -> bool {
         self.profile.capabilities().functions.contains(&function)
+    }
+
+    fn most_bits(&self) -> (u16, u16) {
+        let link = self.profile.file().link.get_ref();
+        let most = |limit: &crate::format::Answer<u16>| limit.given().copied().unwrap_or(1);
+        (most(&link.read_coils), most(&link.write_coils))
+    }
+
+    fn most_words(&self) -> u16 {
+        self.profile.capabilities().read_words
     }
 
     fn read_at(&self, place: (Space, u16)) -> Result<u16, Exception> {

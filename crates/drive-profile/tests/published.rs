@@ -64,7 +64,7 @@ const MISTAKES: &[Mistake] = &[
             "reset = { steps = [{ write = \"CMD\", words = [7] }]",
             "reset = { steps = [{ write = \"CMD\", words = [7] }, { write = \"CMD\", words = [1] }]",
         )],
-        Refused("reset holds a run bit"),
+        Refused("holds a run bit"),
     ),
     (
         "wb-mqtt-serial: the setup of the FC 51 writes 043Ch, and is written again on each reconnect",
@@ -122,6 +122,10 @@ const MISTAKES: &[Mistake] = &[
         MS300,
         &[
             ("mark = \"R\" }\n\n[who]", "mark = \"X\" }\n\n[who]"),
+            (
+                "reset = { steps = [{ write = \"CMD\", words = [0x0001] }, { write = \"CMD2\", words = [0x0002] }, { write = \"CMD2\", words = [0x0000] }, { write = \"CMD\", words = [0x0001] }], clears_itself = false, source = \"um drivers\" }",
+                "reset = \"unknown\"",
+            ),
             (
                 "ramp = { steps = [{ write = \"CMD\", words = [0x0001] }]",
                 "ramp = { steps = [{ write = \"CMD\", words = [0x0000] }]",

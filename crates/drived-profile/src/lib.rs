@@ -10,17 +10,11 @@
 
 mod check;
 mod list;
+mod named;
 mod new;
 mod show;
 mod trial;
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
-
-use drive_profile::Profile;
-use drived_config::profiles;
 use drived_words::failure::Failure;
 
 /// Drives from files: list them, read one as a page, check one that is written, begin one, try one on the drive
@@ -45,16 +39,4 @@ pub async fn run(command: Command) -> Result<(), Failure> {
         Command::New(args) => new::run(&args),
         Command::Try(args) => trial::run(args).await,
     }
-}
-
-/// The profile of a key, or of a file: what has a dot or a slash is one.
-fn named(said: &str) -> Result<(Arc<Profile>, Option<PathBuf>), Failure> {
-    if said.contains(['.', '/', '\\']) {
-        let file = Path::new(said);
-        let profile = profiles::profile(file).map_err(|error| Failure::Input(error.to_string()))?;
-        return Ok((Arc::new(profile), Some(file.to_owned())));
-    }
-    profiles::find(said).ok_or_else(|| {
-        Failure::Input(format!("there is no profile {said:?}: drived profile list has them, or name a file, such as ./{said}.toml"))
-    })
 }

@@ -13,7 +13,7 @@ use drived_words::{
     output::{self, JsonArgs, Table},
 };
 
-use crate::{check, named};
+use crate::{check, named::named};
 
 /// Show what a profile says of its drive, as a page to read: its level, what is not known, how it is read, stopped and started
 #[derive(Debug, clap::Args)]

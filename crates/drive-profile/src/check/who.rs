@@ -46,7 +46,7 @@ impl Check<'_> {
             self.bits(&owner.get_ref().bits);
         }
         if let Some(read) = file.ownership.reads_back.given() {
-            self.readable(&read.get_ref().register);
+            self.reads_back(&read.get_ref().register);
             self.source(&read.get_ref().source);
         }
         if let Some(codes) = file.faults.codes.given() {
@@ -54,6 +54,22 @@ impl Check<'_> {
         }
         self.direction();
         self.watchdog();
+    }
+
+    /// The register in which a command reads back is that of the run words. One that tells the state when it is read is none.
+    fn reads_back(&mut self, name: &Spanned<String>) {
+        self.readable(name);
+        let file = self.file;
+        let is_it = |other: &Spanned<String>| other.get_ref() == name.get_ref();
+        let mut runs = file.command.given().into_iter().flat_map(|of| &of.get_ref().runs);
+        let tells_the_state = file.state.is.iter().any(|is| is_it(&is.get_ref().bits.get_ref().register));
+        if !runs.any(|run| is_it(&run.get_ref().register)) || tells_the_state {
+            self.refuse(
+                &name.span(),
+                format!("reads_back names {}, which has no run word of [command], or tells the state", name.get_ref()),
+                "the register of the run words, where it holds the command when it is read; else \"none\" or \"unknown\"",
+            );
+        }
     }
 
     fn guard(&mut self, spanned: &Spanned<Guard>) {

@@ -11,7 +11,7 @@ use tokio::time::{Duration, Instant, sleep};
 
 use super::{
     ProfileDrive,
-    reading::{OTHERS, withheld},
+    reading::{OTHER_REFERENCE, OTHERS, withheld},
     tables::{mode_name, stop_mode},
 };
 use crate::{
@@ -123,7 +123,11 @@ impl<P: Port> ProfileDrive<P> {
                 Err(error) => return Err(error),
             };
             let local = (status.control == Some(Control::Local)).then_some(OTHERS);
-            let because = local.or_else(|| withheld(&status));
+            // What was given and what the drive shows may be two things: an input adds to it, or a preset takes its place.
+            let seen = self.setpoint_seen(&words);
+            let other =
+                (self.agreed.is_some() && seen.is_some() && self.agreed != seen).then_some(OTHER_REFERENCE);
+            let because = local.or_else(|| withheld(&status)).or(other);
             let output = status.output_frequency;
             let slows = output.is_some() && output < first;
             if because.is_none() && (status.direction == Some(direction) || !tells_direction || slows) {

@@ -225,6 +225,10 @@ impl<P: Port> ProfileDrive<P> {
             },
             State::Ready | State::Disabled | State::NotReady => match output {
                 Some(output) if output != Frequency::ZERO => Output::Braking(output),
+                // Whatever feeds a motor that stands, direct current perhaps: its output is not cut.
+                _ if status.current.is_some_and(|current| current > Current::from_deciamperes(0)) => {
+                    Output::NotKnown
+                }
                 // Behind a stop of this side another may stand by now.
                 _ if self.watch.shaft.was_braked() => Output::Gone,
                 _ => Output::Cut,

@@ -41,8 +41,21 @@ impl<P: Port> ProfileDrive<P> {
         let held = self.limits(fact).await?;
         let word = self.setpoint_word(fact, register, setpoint, &held)?;
         let Some((_, address)) = profile.file().place(register) else { return Ok(()) };
-        self.agreed = None;
-        self.registers.at(Class::Command).replacing(address).write_word(address, word).await?;
+        let before = self.agreed;
+        // What a start rests on from here on, whatever becomes of the write: another setpoint in its place is not this side's.
+        self.agreed = match setpoint {
+            Setpoint::Frequency(frequency) if profile.file().see.setpoint.given().is_some() => {
+                Some(frequency.centihertz().into())
+            }
+            _ => None,
+        };
+        match self.registers.at(Class::Command).replacing(address).write_word(address, word).await {
+            Err(error) if error.kind() == ErrorKind::NotSent => {
+                self.agreed = before;
+                return Err(error);
+            }
+            written => written?,
+        }
         self.registers.owe_judgement();
         self.see_setpoint(setpoint, word).await.map_err(Error::after_write)
     }

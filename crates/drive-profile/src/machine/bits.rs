@@ -2,8 +2,18 @@
 
 use drive_sim::Exception;
 
-use super::Machine;
 use crate::{format::Space, profile::Written};
+
+/// A drive by its places, whatever they are: coils, inputs, registers.
+pub(super) trait Places {
+    fn has_function(&self, function: u8) -> bool;
+    /// Coils or inputs that one read may ask for, and coils that one write may carry.
+    fn most_bits(&self) -> (u16, u16);
+    fn most_words(&self) -> u16;
+    fn read_at(&self, place: (Space, u16)) -> Result<u16, Exception>;
+    fn takes(&self, place: (Space, u16)) -> Result<(), Exception>;
+    fn write_at(&mut self, written: Written) -> Result<(), Exception>;
+}
 
 const READ_COILS: u8 = 0x01;
 const READ_INPUTS: u8 = 0x02;
@@ -16,7 +26,7 @@ const ON: u16 = 0xFF00;
 const OFF: u16 = 0;
 
 /// What it answers to a function that is none of its holding registers.
-pub(super) fn answer(machine: &mut Machine, request: &[u8]) -> Result<Vec<u8>, Exception> {
+pub(super) fn answer(machine: &mut dyn Places, request: &[u8]) -> Result<Vec<u8>, Exception> {
     let has = request.first().is_some_and(|function| machine.has_function(*function));
     match *request {
         _ if !has => Err(Exception::ILLEGAL_FUNCTION),
@@ -48,13 +58,13 @@ pub(super) fn answer(machine: &mut Machine, request: &[u8]) -> Result<Vec<u8>, E
 }
 
 fn read_bits(
-    machine: &Machine,
+    machine: &dyn Places,
     function: u8,
     space: Space,
     first: u16,
     count: u16,
 ) -> Result<Vec<u8>, Exception> {
-    let most = machine.profile.file().link.get_ref().read_coils.given().copied().unwrap_or(1);
+    let most = machine.most_bits().0;
     if count == 0 || count > most {
         return Err(Exception::ILLEGAL_VALUE);
     }
@@ -71,8 +81,8 @@ fn read_bits(
     Ok(answer)
 }
 
-fn read_words(machine: &Machine, first: u16, count: u16) -> Result<Vec<u8>, Exception> {
-    let most = machine.profile.capabilities().read_words;
+fn read_words(machine: &dyn Places, first: u16, count: u16) -> Result<Vec<u8>, Exception> {
+    let most = machine.most_words();
     if count == 0 || count > most {
         return Err(Exception::ILLEGAL_VALUE);
     }
@@ -86,13 +96,13 @@ fn read_words(machine: &Machine, first: u16, count: u16) -> Result<Vec<u8>, Exce
 }
 
 fn write_bits(
-    machine: &mut Machine,
+    machine: &mut dyn Places,
     first: u16,
     count: u16,
     bytes: usize,
     data: &[u8],
 ) -> Result<(), Exception> {
-    let most = machine.profile.file().link.get_ref().write_coils.given().copied().unwrap_or(1);
+    let most = machine.most_bits().1;
     let fits = bytes == usize::from(count.div_ceil(8)) && data.len() == bytes;
     if count == 0 || count > most || !fits {
         return Err(Exception::ILLEGAL_VALUE);

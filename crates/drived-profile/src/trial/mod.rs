@@ -99,7 +99,7 @@ fn text(said: &str) -> Result<(String, Option<PathBuf>), Failure> {
         let found = shipped::TEXTS.iter().find(|(_, text)| drive_profile::digest(text) == profile.digest());
         return Ok((found.map(|(_, text)| (*text).to_owned()).unwrap_or_default(), None));
     }
-    let (_, file) = crate::named(said)?;
+    let (_, file) = crate::named::named(said)?;
     let file = file.unwrap_or_else(|| Path::new(said).to_owned());
     let read = fs::read_to_string(&file);
     let read = read.map_err(|error| ProfilesError::File { file: file.clone(), why: error.to_string() });
