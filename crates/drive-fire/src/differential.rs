@@ -95,8 +95,11 @@ fn ours(case: &Case) -> Option<Vec<u8>> {
     None
 }
 
-/// What the other takes, case by case: slave and PDU.
-fn theirs(python: &Path, cases: &[Case]) -> io::Result<Vec<Option<(u8, Vec<u8>)>>> {
+/// A slave and the PDU that is taken for its answer.
+type Taken = (u8, Vec<u8>);
+
+/// What the other takes, case by case.
+fn theirs(python: &Path, cases: &[Case]) -> io::Result<Vec<Option<Taken>>> {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("peers/pymodbus_frames.py");
     let mut child = Command::new(python).arg(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
@@ -170,7 +173,7 @@ fn alone(case: &Case, taken: &[u8]) -> Case {
 }
 
 /// What does not agree: ours takes what the other does not, or one of them does not take what a manual prints.
-fn against(case: &Case, taken: Option<&[u8]>, other: Option<&(u8, Vec<u8>)>) -> Option<String> {
+fn against(case: &Case, taken: Option<&[u8]>, other: Option<&Taken>) -> Option<String> {
     let same = |taken: &[u8]| other.is_some_and(|(slave, pdu)| *slave == SLAVE && pdu == taken);
     match taken {
         Some(taken) if !same(taken) && !stands_in(case, taken) => {

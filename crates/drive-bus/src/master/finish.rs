@@ -64,9 +64,12 @@ impl<C> Master<C> {
                 Ok(answer) => {
                     // An earlier attempt may have been carried out: its repetition can be refused for that very reason.
                     let doubtful = answer.is_err() && entry.work.is_write && entry.work.last.is_some();
-                    let doubtful = crate::mutant!("refused-repetition-believed", doubtful, false);
                     let refused = "not answered, and refused when it was repeated";
-                    let outcome = if doubtful { Err(PortError::OutcomeUnknown(refused)) } else { Ok(answer) };
+                    let outcome = if crate::mutant!("refused-repetition-believed", doubtful, false) {
+                        Err(PortError::OutcomeUnknown(refused))
+                    } else {
+                        Ok(answer)
+                    };
                     self.outcomes.push_back((entry.work.caller, outcome));
                 }
                 Err(failure) => {
@@ -370,20 +373,23 @@ impl<C> Master<C> {
             && self.schedule.any(|other| {
                 other.terms.class == Class::Stop && (other.slave == 0 || other.slave == entry.slave)
             });
-        let stopped = crate::mutant!("command-repeated-behind-stop", stopped, false);
         // A later request with the same key says that this value is not wanted any more.
         let replaced = entry.terms.replaces.is_some()
             && self
                 .schedule
                 .any(|other| other.slave == entry.slave && other.terms.replaces == entry.terms.replaces);
-        let replaced = crate::mutant!("old-setpoint-repeated", replaced, false);
         // The gateway has not given it up yet, and asks as often as it does. One that answers as a rule is late, and soon heard.
         let was_heard = self.stations.get(&entry.slave).is_some_and(|station| station.timeout.is_learned());
         let is_asked_still =
             !entry.work.is_write && !was_heard && self.far_end.gate(true).is_some_and(|gate| gate > now);
         entry.work.attempts < self.config.retries
             && entry.expires().is_none_or(|expires| now < expires)
-            && !(offline || edge || stopped || replaced || is_asked_still || self.closing)
+            && !(offline
+                || edge
+                || crate::mutant!("command-repeated-behind-stop", stopped, false)
+                || crate::mutant!("old-setpoint-repeated", replaced, false)
+                || is_asked_still
+                || self.closing)
     }
 
     /// The time of a request that nobody answers is over.

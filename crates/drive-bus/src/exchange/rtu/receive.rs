@@ -251,7 +251,8 @@ fn look(current: &mut Current, bytes: &[u8]) -> Found {
         return Found::Nothing;
     }
     let whole = |len: usize| {
-        bytes.get(..len + OVERHEAD).map(|frame| crate::mutant!("crc-unchecked", crc_fits(frame), true))
+        let frame = bytes.get(..len + OVERHEAD)?;
+        Some(crate::mutant!("crc-unchecked", crc_fits(frame), true))
     };
     match answer::extent(&current.request, pdu) {
         Extent::AtLeast(_) => Found::Beginning,
