@@ -71,7 +71,11 @@ const MISTAKES: [(u32, &str, Ends); 55] = [
     ),
     (26, "status --line LINE,19200,8E1 --drive 1", Answered(2, &["of which family? drived scan finds it"])),
     (27, "status --line LINE,19200,8E1", Answered(2, &["such as --drive atv312@1, which drived scan finds"])),
-    (28, "status pump1", Answered(2, &["start one by drived run --config FILE", "--line and --drive"])),
+    (
+        28,
+        "status pump1 --socket CAPTURE.sock",
+        Answered(2, &["start one by drived run --config FILE", "--line and --drive"]),
+    ),
     (
         29,
         "setpoint --line LINE,19200,8E1 --drive atv312@1 30",
