@@ -145,10 +145,28 @@ impl Frames {
     }
 }
 
+/// Whether a path is a device, which has no end.
+fn is_device(path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt as _;
+        let kind = fs::metadata(path).map(|found| found.file_type());
+        kind.is_ok_and(|kind| kind.is_char_device() || kind.is_block_device())
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = path;
+        false
+    }
+}
+
 /// What a file has, or what comes on standard input until it ends.
 pub(super) fn taken(file: Option<&Path>, without_check: bool) -> Result<Taken, Failure> {
     let name = file.map_or_else(|| "standard input".to_owned(), |file| file.display().to_string());
     let failed = |why: &dyn std::fmt::Display| Failure::Input(format!("{name}: {why}"));
+    if file.is_some_and(is_device) {
+        return Err(failed(&"it is a device: expected a file, or a pipe"));
+    }
     let mut bytes = Vec::new();
     let read = match file {
         Some(file) => fs::File::open(file).and_then(|file| file.take(LONGEST + 1).read_to_end(&mut bytes)),

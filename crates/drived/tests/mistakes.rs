@@ -18,7 +18,7 @@ enum Ends {
 
 use Ends::{Answered, Understood};
 
-/// The mistakes by their numbers. `LINE` is the port of simulated drives set up for the bus, `FACTORY` that of one in its factory setting, `CAPTURE` a capture, `~` a space inside a word.
+/// The mistakes by their numbers. `LINE` is the port of simulated drives set up for the bus (which take the start of the 53rd), `CAPTURE` a capture, `~` a space inside a word.
 const MISTAKES: [(u32, &str, Ends); 55] = [
     (
         1,
@@ -71,7 +71,11 @@ const MISTAKES: [(u32, &str, Ends); 55] = [
     ),
     (26, "status --line LINE,19200,8E1 --drive 1", Answered(2, &["of which family? drived scan finds it"])),
     (27, "status --line LINE,19200,8E1", Answered(2, &["such as --drive atv312@1, which drived scan finds"])),
-    (28, "status pump1", Answered(2, &["start one by drived run --config FILE", "--line and --drive"])),
+    (
+        28,
+        "status pump1 --socket CAPTURE.sock",
+        Answered(2, &["start one by drived run --config FILE", "--line and --drive"]),
+    ),
     (
         29,
         "setpoint --line LINE,19200,8E1 --drive atv312@1 30",
@@ -148,7 +152,11 @@ const MISTAKES: [(u32, &str, Ends); 55] = [
         "param restore CAPTURE --line LINE,19200,8E1",
         Answered(2, &["it is a capture and no backup", "drived explain"]),
     ),
-    (53, "start --line FACTORY,19200,8E1 --drive atv312@1", Answered(1, &["refused", "SA2"])),
+    (
+        53,
+        "start --line LINE,19200,8E1 --drive atv312@2",
+        Understood(0, "started forward at 0.00 Hz: its setpoint is zero"),
+    ),
     (54, "completions powershell", Answered(2, &["[possible values: bash, zsh, fish]"])),
     (55, "plan --line LINE,19200,8E1 --drive atv312@1-40", Answered(2, &["share the drives among lines"])),
 ];
@@ -156,18 +164,13 @@ const MISTAKES: [(u32, &str, Ends); 55] = [
 #[test]
 fn every_mistake_of_a_tired_person_is_understood_or_answered_on_one_line() {
     let sim = Sim::serve_with("mistakes", &["atv312@1-3"], &[]);
-    let factory = Sim::serve_with("mistakes-factory", &["atv312@1"], &["--factory"]);
     let capture = path("mistakes.pcapng");
     fs::write(&capture, [&[0x0A, 0x0D, 0x0D, 0x0A][..], &[0xFF; 24]].concat()).expect("it can be written");
     let capture_name = capture.to_str().expect("the path is text");
     let mut wrong = Vec::new();
     for (number, typed, ends) in &MISTAKES {
-        let here = |text: &str| {
-            text.replace("LINE", sim.link())
-                .replace("FACTORY", factory.link())
-                .replace("CAPTURE", capture_name)
-                .replace('~', " ")
-        };
+        let here =
+            |text: &str| text.replace("LINE", sim.link()).replace("CAPTURE", capture_name).replace('~', " ");
         let words: Vec<String> = typed.split(' ').map(here).collect();
         let ended = run(&words.iter().map(String::as_str).collect::<Vec<_>>());
         println!(

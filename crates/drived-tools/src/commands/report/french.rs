@@ -166,7 +166,7 @@ const WORDS: &[(&str, &str)] = &[
     ("no answer", "sans réponse"),
     ("damaged", "endommagée"),
     ("late", "en retard"),
-    ("mismatched", "discordante"),
+    ("not fitting", "discordante"),
     ("exception", "exception"),
     ("damaged share", "part endommagée"),
     ("statuses that came", "états reçus"),

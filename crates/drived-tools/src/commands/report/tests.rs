@@ -80,8 +80,16 @@ fn chapter(html: &str, name: &str) -> String {
     texts(&html[begin..end])
 }
 
+/// Without the marks of what is the program's own: a sentence goes on behind it.
+fn unmarked(html: &str) -> String {
+    let mut parts = html.split("<span class=\"own\">");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |text, part| text + &part.replacen("</span>", "", 1))
+}
+
 fn texts(html: &str) -> String {
     let mut text = String::new();
+    let html = unmarked(html);
     for part in html.split('<') {
         let (_, said) = part.split_once('>').unwrap_or(("", part));
         text.push_str(said.trim());
