@@ -148,6 +148,24 @@ async fn a_drive_of_split_registers_is_turned_round_and_its_run_command_is_in_fo
     assert!(!matches!(status.verdict, Some(Verdict::InForce)), "{:?}", status.verdict);
 }
 
+/// What was given and what the drive shows are two things: an input, a preset or another master may stand between them.
+#[tokio::test(start_paused = true)]
+async fn a_start_at_another_setpoint_than_was_given_is_not_confirmed() {
+    let mut rig = rig("goodrive");
+    rig.drive.status().await.expect("it answers");
+    rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+    rig.machine.written_by_another(0x2001, 3_000).expect("it takes it");
+    let error = rig.drive.start(Direction::Forward).await.expect_err("it runs at 30 Hz");
+    assert!(
+        matches!(error, Error::NotConfirmed { .. }) && error.to_string().contains("another setpoint"),
+        "{error}"
+    );
+    rig.drive.set_setpoint(Frequency::from_hertz(25).into()).await.expect("it takes it");
+    rig.drive.stop(StopMode::Ramp).await.expect("it stops");
+    rig.until_machine("it stands", |machine| machine.shaft_frequency == 0).await;
+    rig.drive.start(Direction::Forward).await.expect("it is what was given");
+}
+
 #[tokio::test(start_paused = true)]
 async fn who_commands_is_told_only_where_the_drive_tells_it() {
     for key in DRIVEN {
