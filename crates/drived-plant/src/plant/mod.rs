@@ -16,7 +16,7 @@ mod watching;
 
 use std::{
     collections::HashMap,
-    sync::{Arc, PoisonError, RwLock},
+    sync::{Arc, OnceLock, PoisonError, RwLock},
 };
 
 use drive_bus::Line;
@@ -42,7 +42,7 @@ use self::{
     tally::Tally,
     usage::Usage,
 };
-use drived_config::{config::Group, rights::Caller};
+use drived_config::{config::Group, names::Names, rights::Caller};
 use drived_words::json::unix;
 
 /// How many of its last exchanges a line keeps, for whoever looks at it after something has gone wrong: 20 KiB a line.
@@ -71,6 +71,7 @@ struct Inner {
     tally: Tally,
     usage: Usage,
     alarms: alarms::Desk,
+    names: OnceLock<Names>,
 }
 
 impl Plant {
@@ -98,6 +99,7 @@ impl Plant {
             tally: Tally::default(),
             usage: Usage::default(),
             alarms: alarms::Desk::new(kept),
+            names: OnceLock::new(),
         });
         watching::start(&inner);
         history::start(&inner);
@@ -124,6 +126,7 @@ impl Plant {
                 rights: caller.rights,
                 caller: caller.name.clone(),
                 scope: caller.scope.is_some().then(|| self.commanded_by(caller)),
+                names_revision: self.0.names.get().and_then(Names::revision),
             },
             lines: self.lines(),
             drives: self.drives(),
@@ -167,6 +170,12 @@ impl Plant {
     /// The groups are these from now on.
     pub fn set_groups(&self, groups: Vec<Group>) {
         *self.0.groups.write().unwrap_or_else(PoisonError::into_inner) = groups;
+    }
+
+    /// Who has which number is told by these from now on.
+    pub fn set_names(&self, names: Names) {
+        // It has them once, as long as the program.
+        let _ = self.0.names.set(names);
     }
 
     /// What the configuration says of a drive that the bus cannot tell: its words mean nothing for certain without it.
