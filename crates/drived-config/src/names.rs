@@ -9,6 +9,8 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
+use crc::{CRC_16_MODBUS, Crc};
+
 pub use self::table::{Configured, Kind, Known, Named, Table, Told, topic_id};
 use crate::{
     config::{Group, LinePart},
@@ -93,6 +95,11 @@ impl Names {
         self.lock().table.as_ref().map(Table::slots)
     }
 
+    /// The number that tells this order of the drives from another; `None`: what is kept cannot be read.
+    pub fn revision(&self) -> Option<u16> {
+        self.slots().map(|slots| revision(&slots))
+    }
+
     /// The topic of something, by its name.
     pub fn topic(&self, kind: Kind, name: &str) -> String {
         let inner = self.lock();
@@ -111,6 +118,18 @@ impl Names {
     fn lock(&self) -> MutexGuard<'_, Inner> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// A number that tells one order of the drives from another: the CRC-16 of Modbus over their names, each with its place.
+pub fn revision(slots: &[Option<Arc<str>>]) -> u16 {
+    const CHECK: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
+    let mut digest = CHECK.digest();
+    for (slot, name) in slots.iter().enumerate() {
+        if let Some(name) = name {
+            digest.update(format!("{slot}\t{name}\n").as_bytes());
+        }
+    }
+    digest.finalize()
 }
 
 /// The file of a state folder.

@@ -133,7 +133,8 @@ settings! {
         |to, said| to.patience = within(said.0.0, Duration::from_millis(50)..=60 * SECOND, "")?;
     /// the class of its reads: `"status"`, in turn with the daemon's own polls, or `"background"`, behind them
     reads: Parsed<Reads> = "`\"status\"`", |to, said| to.reads = said.0.0;
-    /// how much of each line it may use, in percent, 1 to 80; less where the line's plan leaves less, with 5 % kept free
+    /// how much of each line it has in turn with the daemon's polls, in percent, 1 to 80; less where the line's plan leaves less, with
+    /// 5 % kept free. What nobody else wants of the line its reads have besides, behind everything else
     share: u8 = "`30`", |to, said| to.share = within(*said, 1..=80, "")?;
     /// `"map"`: only registers of the family's list are read; `"any"`: the drive itself judges
     registers: Parsed<Registers> = "`\"any\"`", |to, said| to.mapped_only = said.0.0;

@@ -10,7 +10,7 @@ use std::{
 };
 
 use drive_core::{
-    Port as _, PortError, Terms,
+    Class, Port as _, PortError, Terms,
     tokio_modbus::{ExceptionCode, Response, client::Client as _},
 };
 use drive_fleet::{DriveHandle, LineBudget};
@@ -18,7 +18,10 @@ use futures_util::{
     FutureExt as _,
     future::{BoxFuture, Shared, WeakShared},
 };
-use tokio::time::{Instant, sleep_until, timeout_at};
+use tokio::{
+    sync::{OwnedSemaphorePermit, Semaphore},
+    time::{Instant, sleep_until, timeout_at},
+};
 
 pub(crate) use self::writes::Stop;
 use super::{
@@ -37,6 +40,10 @@ use drived_plant::plant::Plant;
 
 /// What the daemon keeps of a line for itself, besides what it has planned, in percent.
 const RESERVE: u32 = 5;
+
+/// So many reads beyond the share wait on a line at once: the next one is there when one ends, and the daemon's own readings of the same
+/// class have their turns.
+const BEYOND: usize = 2;
 
 /// What a client wants.
 pub(super) struct Asked {
@@ -62,23 +69,47 @@ struct Turns {
     /// Whoever waits for his turn stands in this row. Each client stands there once, so that all come round.
     row: tokio::sync::Mutex<()>,
     share: Mutex<Share>,
+    /// Those that use what nobody else wants of the line.
+    beyond: Arc<Semaphore>,
+}
+
+/// How an exchange goes to the line.
+enum Turn {
+    /// Within the share.
+    Share,
+    /// Beyond it: behind everything else, so that it uses only what is left.
+    Beyond { _place: OwnedSemaphorePermit },
 }
 
 impl Turns {
     fn new() -> Self {
-        Self { row: tokio::sync::Mutex::default(), share: Mutex::new(Share::new(Instant::now())) }
+        let share = Mutex::new(Share::new(Instant::now()));
+        Self { row: tokio::sync::Mutex::default(), share, beyond: Arc::new(Semaphore::new(BEYOND)) }
     }
 
-    /// Waits for a turn of this length.
-    async fn take(&self, takes: Duration, percent: u32) {
+    /// Waits for a turn of this length, within the share, or beyond it where that is allowed.
+    async fn take(&self, takes: Duration, percent: u32, may_go_beyond: bool) -> Turn {
         let _first = self.row.lock().await;
         loop {
             let now = Instant::now();
-            let free_at = lock(&self.share).free_at(now);
+            let (free_at, is_in_vain) = {
+                let share = lock(&self.share);
+                (share.free_at(now), share.is_owed_more_than(takes, percent, now))
+            };
             if free_at <= now {
-                return self.charge(takes, percent);
+                self.charge(takes, percent);
+                return Turn::Share;
             }
-            sleep_until(free_at).await;
+            let beyond = async {
+                match may_go_beyond && !is_in_vain {
+                    true => Arc::clone(&self.beyond).acquire_owned().await.ok(),
+                    false => None,
+                }
+            };
+            tokio::select! {
+                () = sleep_until(free_at) => {}
+                Some(_place) = beyond => return Turn::Beyond { _place },
+            }
         }
     }
 
@@ -255,8 +286,11 @@ impl Desk {
         });
         let percent = self.percent_of(name);
         let turns = self.turns_of(name);
-        let turn = timeout_at(deadline, turns.take(answered, percent)).await;
-        turn.map_err(|_| ExceptionCode::ServerDeviceBusy)?;
+        let is_read = matches!(ask, Ask::Read { .. });
+        let turn = timeout_at(deadline, turns.take(answered, percent, is_read)).await;
+        let turn = turn.map_err(|_| ExceptionCode::ServerDeviceBusy)?;
+        let class = if matches!(turn, Turn::Beyond { .. }) { Class::Background } else { terms.class };
+        let terms = Terms { class, ..terms };
         // What is sent at the last moment has the time of an answer, where the patience is long enough for that.
         let left = deadline.saturating_duration_since(Instant::now());
         let lifetime = left.saturating_sub(lost).max(left / 2);
@@ -276,7 +310,8 @@ impl Desk {
             Err(_) => (ExceptionCode::GatewayTargetDevice, true),
         };
         if was_lost {
-            turns.charge(lost.saturating_sub(answered), percent);
+            let charged = if matches!(turn, Turn::Share) { answered } else { Duration::ZERO };
+            turns.charge(lost.saturating_sub(charged), percent);
         }
         Err(code)
     }

@@ -123,7 +123,7 @@ fn meaning(gateway: &GatewayConfig) -> Vec<(&'static str, String)> {
         }
     };
     let reads = format!(
-        "as {}, together with the rest within {share} % of a line, as far as its plan leaves that",
+        "as {}, together with the rest within {share} % of a line, as far as its plan leaves that; behind everything else what is left",
         gateway.reads
     );
     let writes = match gateway.rights {

@@ -25,11 +25,20 @@ impl Share {
         self.paid_at.checked_sub(AHEAD).unwrap_or(now).max(now)
     }
 
+    /// Whether more is owed than reads within the share owe: exchanges in vain, which take a line from everybody.
+    pub(super) fn is_owed_more_than(&self, takes: Duration, percent: u32, now: Instant) -> bool {
+        self.paid_at > now + AHEAD + due(takes, percent)
+    }
+
     /// The line is used for so long, at a share of so many percent.
     pub(super) fn charge(&mut self, now: Instant, used: Duration, percent: u32) {
-        let due = used.saturating_mul(100) / percent.max(1);
-        self.paid_at = self.paid_at.max(now).checked_add(due).unwrap_or(self.paid_at);
+        self.paid_at = self.paid_at.max(now).checked_add(due(used, percent)).unwrap_or(self.paid_at);
     }
+}
+
+/// In which time such a use is paid back.
+fn due(used: Duration, percent: u32) -> Duration {
+    used.saturating_mul(100) / percent.max(1)
 }
 
 #[cfg(test)]

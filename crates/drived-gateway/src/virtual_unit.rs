@@ -6,12 +6,11 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-use crc::{CRC_16_MODBUS, Crc};
 use drive_core::{Control, Direction, Setpoint, State, Status};
 use drive_fleet::{
     Became, DriveHandle, Event, EventKind, Events, Freshness, Link, Outcome, Received, Snapshot,
 };
-use drived_config::names::PLACES;
+use drived_config::names::{PLACES, revision};
 use tokio::time::Instant;
 
 /// What stands for a value that is not known, or too old to be told as one.
@@ -318,18 +317,6 @@ pub(super) fn read(
         _ => of_block(address, OVERVIEW_AT, &OVERVIEW),
     };
     (0..count).map(|number| register(address.checked_add(number)?)).collect()
-}
-
-/// A number that tells one order of the drives from another: the CRC-16 of Modbus over their names, each with its place.
-fn revision(slots: &[Option<Arc<str>>]) -> u16 {
-    const CHECK: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
-    let mut digest = CHECK.digest();
-    for (slot, name) in slots.iter().enumerate() {
-        if let Some(name) = name {
-            digest.update(format!("{slot}\t{name}\n").as_bytes());
-        }
-    }
-    digest.finalize()
 }
 
 /// Each number that is given has a place, in the overview and in the details.

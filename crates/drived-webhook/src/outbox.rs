@@ -322,6 +322,11 @@ mod tests {
         let (first, lost) = next(&mut outbox);
         assert_eq!((first.view.alarm.id, lost), (0, 3), "a motor that may move goes first");
         outbox.taken(lost);
+        let mut newest = view(7_000, "unacknowledged");
+        newest.of_motion = true;
+        outbox.offer(newest, 7_000, Instant::now());
+        assert_eq!(next(&mut outbox).0.view.alarm.id, 7_000, "also the newest");
+        outbox.taken(0);
         let (second, lost) = next(&mut outbox);
         assert_eq!((second.view.alarm.id, lost), (4, 0));
         outbox.refused();

@@ -232,7 +232,7 @@ fn by_the_recipes_a_phone_is_called_a_channel_told_each_step_and_a_program_sure_
     let called = receive(&phone, "200 OK");
     assert!(called.body.contains("(unacknowledged)"), "{}", called.body);
     // Somebody who does not know the secret is not believed.
-    let forged = format!("{{\"id\":\"x\",\"alarm\":{{}}}}\r\n");
+    let forged = "{\"id\":\"x\",\"alarm\":{}}\r\n";
     let answer = support::ask(
         own,
         &format!(

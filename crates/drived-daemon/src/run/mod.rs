@@ -129,6 +129,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let alarms = plant.keep_alarms(alarms);
     let names = Names::in_folder(config.doors.state.folder.as_deref());
     tell_names(&names, &config.lines, &config.groups);
+    plant.set_names(names.clone());
     plant.set_options(options(&config.lines));
     let opened = Opened::default();
     opened.tell(&config.lines);

@@ -18,7 +18,7 @@ mod watching;
 use std::{
     collections::HashMap,
     env,
-    sync::{Arc, PoisonError, RwLock},
+    sync::{Arc, OnceLock, PoisonError, RwLock},
 };
 
 use drive_bus::Line;
@@ -46,7 +46,7 @@ use self::{
     tally::Tally,
     usage::Usage,
 };
-use drived_config::{config::Group, rights::Caller};
+use drived_config::{config::Group, names::Names, rights::Caller};
 use drived_words::json::unix;
 
 /// How many of its last exchanges a line keeps, for whoever looks at it after something has gone wrong: 20 KiB a line.
@@ -76,6 +76,7 @@ struct Inner {
     tally: Tally,
     usage: Usage,
     alarms: alarms::Desk,
+    names: OnceLock<Names>,
 }
 
 impl Plant {
@@ -104,6 +105,7 @@ impl Plant {
             tally: Tally::default(),
             usage: Usage::default(),
             alarms: alarms::Desk::new(kept),
+            names: OnceLock::new(),
         });
         watching::start(&inner);
         history::start(&inner);
@@ -131,6 +133,7 @@ impl Plant {
                 rights: caller.rights,
                 caller: caller.name.clone(),
                 scope: caller.scope.is_some().then(|| self.commanded_by(caller)),
+                names_revision: self.0.names.get().and_then(Names::revision),
             },
             lines: self.lines(),
             drives: self.drives(),
@@ -174,6 +177,12 @@ impl Plant {
     /// The groups are these from now on.
     pub fn set_groups(&self, groups: Vec<Group>) {
         *self.0.groups.write().unwrap_or_else(PoisonError::into_inner) = groups;
+    }
+
+    /// Who has which number is told by these from now on.
+    pub fn set_names(&self, names: Names) {
+        // It has them once, as long as the program.
+        let _ = self.0.names.set(names);
     }
 
     /// What the configuration says of a drive that the bus cannot tell: its words mean nothing for certain without it.

@@ -60,4 +60,8 @@ pub struct DaemonView {
     /// The drives that the asker's token is for; absent where it is for all. He may stop the others, too, where he may stop.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scope: Option<Vec<String>>,
+    /// Which order of the drives holds, as the head of a virtual unit and `drived export gateway-map` have it: another number when a drive
+    /// has come, left, or has another name. Absent where nobody has a number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub names_revision: Option<u16>,
 }
