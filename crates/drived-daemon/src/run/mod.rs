@@ -12,7 +12,13 @@ mod report;
 mod runs;
 mod watchdogs;
 
-use std::{collections::HashMap, io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    collections::HashMap,
+    io::IsTerminal as _,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
 
 use drive_bus::Line;
 use drive_families::Options;
@@ -63,7 +69,7 @@ const AUDITED_WITHIN: Duration = Duration::from_secs(2);
 
 /// Watch and command the drives of a configuration
 ///
-/// Events and snapshots are JSON objects on stdout, one a line; the log is on stderr. On a terminal the drives are shown as
+/// Without a drive, or a configuration, it begins all the same, says where its page is, and waits for a reload. Events and snapshots are JSON objects on stdout, one a line; the log is on stderr. On a terminal the drives are shown as
 /// a table with the log below it; where only stdout is one, it has a line for each drive whose state has changed. Ctrl-C and SIGTERM end it: each drive's
 /// policy acts, and what was done is told. A second Ctrl-C ends it at once. Exit code 1 when a motor may turn that no policy
 /// leaves turning. A stdout that nobody reads any more ends nothing: the drives are watched on.
@@ -84,7 +90,7 @@ pub struct Args {
 }
 
 pub async fn run(args: Args) -> Result<(), Failure> {
-    let config = Config::load_workable(&args.config)?;
+    let config = Config::load_to_begin(&args.config)?;
     for doubt in config.doubts() {
         tracing::warn!("{doubt}");
     }
@@ -130,6 +136,9 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     plant.set_options(options(&config.lines));
     let faces = Faces::open(faces, Surroundings::new(plant.clone(), doors.audit(), names.clone()));
     let shutdown = config.shutdown;
+    if config.lines.is_empty() {
+        tell_beginning(&args.config);
+    }
     let reloader = Reloader::new(plant.clone(), notify.clone(), names, faces.clone(), args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
     let sources: Vec<Arc<dyn Source>> = vec![Arc::new(reloader.clone()), Arc::new(faces.clone())];
@@ -191,6 +200,15 @@ pub async fn run(args: Args) -> Result<(), Failure> {
         closing::close(&line).await;
     }
     ended.and(read.unwrap_or(Ok(())))
+}
+
+/// Says what is done first where there is no drive yet.
+fn tell_beginning(file: &Path) {
+    let file = file.display();
+    tracing::warn!(
+        "no drive yet: drived scan --line PORT,19200,8E1 --save {file} finds those of a port and writes them down, read only; then \
+         drived reload"
+    );
 }
 
 /// Gives what there is its numbers and topics, and says in the log what has changed.
