@@ -145,7 +145,7 @@ pub(super) struct Gate {
     pub(super) router: Router,
     pub(super) tokens: Option<Arc<Tokens>>,
     pub(super) audit: Audit,
-    pub(super) sessions: Mutex<Sessions>,
+    pub(super) sessions: Sessions,
     /// Wrong tokens, by address.
     pub(super) failures: Mutex<Failures<Option<IpAddr>>>,
     /// What somebody may not do and has asked for, by caller.
@@ -368,7 +368,7 @@ impl Gate {
             Authority::Freely => true,
             Authority::Token { sha256, role } => of_hash(sha256, *role),
             Authority::Session { secret, sha256, role } => {
-                let is_begun = lock(&self.sessions).token(secret, Instant::now()) == Some(sha256.as_str());
+                let is_begun = self.sessions.token(secret, Instant::now()).as_ref() == Some(sha256);
                 is_begun && of_hash(sha256, *role)
             }
         }
@@ -403,7 +403,7 @@ impl Gate {
         let Some(authorization) = headers.get(header::AUTHORIZATION) else {
             // A session that is over is no wrong token: who had it is anybody again, and the page says so.
             let Some(secret) = sessions::cookie(headers) else { return Ok(None) };
-            let hash = lock(&self.sessions).token(secret, Instant::now()).map(str::to_owned);
+            let hash = self.sessions.token(secret, Instant::now());
             let (Some(sha256), Some(tokens)) = (hash, &self.tokens) else { return Ok(None) };
             let token = tokens.of_hash(&sha256)?;
             let secret = secret.to_owned();
@@ -443,7 +443,7 @@ impl Gate {
             return Err(self.failed(peer, &caller));
         };
         let session = tokens::new_secret().map_err(unreadable)?;
-        lock(&self.sessions).begin(&session, &sha256(secret.as_bytes()), Instant::now());
+        self.sessions.begin(&session, &sha256(secret.as_bytes()), Instant::now());
         let caller = of_token(&token, caller);
         self.audit.record(Record::new(Kind::Login, &caller, "login")).whenever();
         Ok(told(&caller, Some(&session), door.encrypted))
@@ -451,7 +451,7 @@ impl Gate {
 
     fn log_out(&self, door: &Door, caller: &Caller, headers: &HeaderMap) -> Response {
         if let Some(session) = sessions::cookie(headers) {
-            lock(&self.sessions).end(session);
+            self.sessions.end(session);
             self.changes.send_replace(());
         }
         self.audit.record(Record::new(Kind::Logout, caller, "logout")).whenever();

@@ -61,6 +61,7 @@ use self::{
     crowd::{Crowd, Limits, Place},
     gate::{Door, Gate, Peer},
     host::Hosts,
+    sessions::Sessions,
     tls::Tls,
     tokens::Tokens,
 };
@@ -102,6 +103,7 @@ pub struct Doors {
 pub struct Prepared {
     tokens: Option<Arc<Tokens>>,
     audit: Audit,
+    sessions: Sessions,
     #[cfg(unix)]
     socket: Option<Entrance>,
     http: Option<(HttpConfig, Option<Tls>)>,
@@ -135,12 +137,14 @@ impl Doors {
             Ok((http, tls))
         });
         let http = http.transpose()?;
+        let sessions = Sessions::in_folder(config.state.folder.as_deref(), Instant::now());
         let audit = config.state.audit.as_deref().map(Audit::open).transpose().map_err(Failure::Input)?;
         #[cfg(unix)]
         let socket = config.socket.as_ref().map(Entrance::of_socket).transpose()?.flatten();
         Ok(Prepared {
             tokens,
             audit: audit.unwrap_or_default(),
+            sessions,
             #[cfg(unix)]
             socket,
             http,
@@ -160,8 +164,8 @@ impl Prepared {
         let (ended, end) = watch::channel(false);
         let (here, gone) = mpsc::channel(1);
         let (listens, listening) = watch::channel(self.http.is_none());
-        let Self { tokens, audit, .. } = self;
-        let (sessions, failures, refused, pace, changes) = Default::default();
+        let Self { tokens, audit, sessions, .. } = self;
+        let (failures, refused, pace, changes) = Default::default();
         let gate = Gate {
             router,
             tokens,

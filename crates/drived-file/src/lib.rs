@@ -33,6 +33,9 @@ use drived_doors::config::DoorsConfig;
 use drived_face::{Configured, Site, Written};
 use drived_words::failure::Failure;
 
+/// The configuration of whoever names none.
+const USUAL: &str = "drives.toml";
+
 /// The tables of the file whose keys are declared, each with its head: those of the daemon itself, and those of the faces that the
 /// program knows.
 pub fn tables() -> Vec<(String, Vec<&'static Key>)> {
@@ -70,13 +73,37 @@ impl Config {
         }
     }
 
+    /// Reads a file that may have no drive yet. The usual one need not be there; whoever names another means it.
+    pub fn load_or_empty(file: &Path) -> Result<Self, ConfigError> {
+        match checks::read_file(file) {
+            Ok(text) => Self::parse(file, &text),
+            Err(_) if file == Path::new(USUAL) && !file.exists() => Self::parse(file, ""),
+            Err(why) => Err(Source { file, text: "" }.error_of_file(format_args!("cannot be read: {why}"))),
+        }
+    }
+
+    /// The same, whose lines can work.
+    pub fn load_to_begin(file: &Path) -> Result<Self, Failure> {
+        Self::load_or_empty(file).and_then(Self::workable).map_err(|error| Failure::Input(error.to_string()))
+    }
+
     /// Reads a file whose lines can work.
     pub fn load_workable(file: &Path) -> Result<Self, Failure> {
         Self::load(file).and_then(Self::workable).map_err(|error| Failure::Input(error.to_string()))
     }
 
-    /// Reads the text of a file.
+    /// Reads the text of a file with drives.
     fn read(file: &Path, text: &str) -> Result<Self, ConfigError> {
+        let config = Self::parse(file, text)?;
+        if config.lines.is_empty() {
+            return Err(
+                Source { file, text }.error_of_file("no drive: expected [[drives]] with line and drive")
+            );
+        }
+        Ok(config)
+    }
+
+    fn parse(file: &Path, text: &str) -> Result<Self, ConfigError> {
         let source = Source { file, text };
         let wrong = |error: toml::de::Error| match error.span() {
             Some(span) => source.error(span, error.message()),

@@ -337,6 +337,30 @@ fn a_file_without_drives_or_a_line_without_any_is_refused() {
 }
 
 #[test]
+fn a_daemon_begins_without_drives_and_with_nothing_else_that_is_wrong() {
+    let folder = std::env::temp_dir().join(format!("drived-begin-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("drives.toml");
+    // Whoever names a file that is not there has misspelt it.
+    assert!(Config::load_to_begin(&file).unwrap_err().to_string().contains("cannot be read"));
+    std::fs::write(&file, "# nothing yet\n").unwrap();
+    assert!(Config::load_to_begin(&file).unwrap().lines.is_empty());
+    std::fs::write(&file, "state = \"/var/lib/drived\"\n").unwrap();
+    let config = Config::load_to_begin(&file).unwrap();
+    assert_eq!(config.doors.state.folder.as_deref(), Some(Path::new("/var/lib/drived")));
+    assert!(Config::load_workable(&file).unwrap_err().to_string().contains("no drive: expected [[drives]]"));
+    for (wrong, told) in [
+        ("[lines.a]\nport = \"/dev/ttyUSB0\"\n", "no drive"),
+        ("stat = 1\n", "unknown field"),
+        ("[http\n", ""),
+    ] {
+        std::fs::write(&file, wrong).unwrap();
+        assert!(Config::load_to_begin(&file).unwrap_err().to_string().contains(told), "{wrong}");
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
 fn the_example_is_a_configuration_that_works() {
     let config = read(include_str!("../../../examples/drives.toml")).unwrap();
     assert_eq!(config.lines.iter().map(|line| line.drives.len()).collect::<Vec<_>>(), [31, 3]);

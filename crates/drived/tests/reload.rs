@@ -5,7 +5,7 @@ mod support;
 
 use std::process::{Command, Stdio};
 
-use support::{File, Running, Sim};
+use support::{File, Running, Sim, run};
 
 fn configuration(port: &str, drives: &[(u8, &str)]) -> String {
     let head = format!("snapshots = \"500ms\"\n[lines.bench]\nport = \"{port},19200,8E1\"\n");
@@ -45,6 +45,31 @@ fn a_hangup_reads_the_configuration_again_and_touches_only_what_has_changed() {
     assert!(shown.contains(r#""state":"running""#) && shown.contains(r#""lost":0"#), "{shown}");
     let (code, rest) = daemon.interrupt();
     assert_eq!(code, Some(0), "{rest}");
+}
+
+#[test]
+fn without_drives_it_begins_says_what_to_do_and_has_those_that_a_scan_writes_down_without_a_restart() {
+    let sim = Sim::serve("begins", &["atv312@1-2"]);
+    let file = File::new("begins", "");
+    let mut daemon = Running::start(&["run", "--config", file.path()]);
+    daemon.wait_for_log("no drive yet: drived scan --line PORT,19200,8E1 --save");
+    // It writes no file that is there.
+    std::fs::remove_file(file.path()).expect("it is there");
+    let line = format!("{},19200,8E1", sim.link());
+    let scan = run(&["scan", "--line", &line, "--addresses", "1-3", "--save", file.path()]);
+    scan.assert_done();
+    daemon.signal("-HUP");
+    daemon.wait_for_log("line main added; drive 1 added; drive 2 added");
+    for _ in 0..2 {
+        daemon.wait_for(r#""event":"connected""#);
+    }
+    // An empty file is no wish that all of them leave.
+    std::fs::write(file.path(), "").expect("it can be written");
+    daemon.signal("-HUP");
+    daemon.wait_for_log("the old configuration holds on");
+    assert_eq!(daemon.interrupt().0, Some(0));
+    // Whoever names a file that is not there has misspelt it.
+    run(&["run", "--config", "/nowhere/drives.toml"]).assert_refused(2, "cannot be read");
 }
 
 #[test]

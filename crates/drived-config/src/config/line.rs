@@ -126,7 +126,8 @@ impl Members {
         {
             return Err(source.error(span, "a default names no line and no drive: expected in [[drives]]"));
         }
-        if drives.is_empty() {
+        // A file without either is one of which nothing is known yet.
+        if drives.is_empty() && !lines.is_empty() {
             return Err(source.error_of_file("no drive: expected [[drives]] with line and drive"));
         }
         let mut groups: BTreeMap<String, Vec<Member>> = BTreeMap::new();

@@ -13,7 +13,13 @@ mod report;
 mod runs;
 mod watchdogs;
 
-use std::{collections::HashMap, io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    collections::HashMap,
+    io::IsTerminal as _,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
 
 use drive_bus::Line;
 use drive_families::Options;
@@ -65,7 +71,7 @@ const AUDITED_WITHIN: Duration = Duration::from_secs(2);
 
 /// Watch and command the drives of a configuration
 ///
-/// Events and snapshots are JSON objects on stdout, one a line; the log is on stderr. On a terminal the drives are shown as
+/// Without a drive, or a configuration, it begins all the same, says where its page is, and waits for a reload. Events and snapshots are JSON objects on stdout, one a line; the log is on stderr. On a terminal the drives are shown as
 /// a table with the log below it; where only stdout is one, it has a line for each drive whose state has changed. Ctrl-C and SIGTERM end it: each drive's
 /// policy acts, and what was done is told. A second Ctrl-C ends it at once. Exit code 1 when a motor may turn that no policy
 /// leaves turning. A stdout that nobody reads any more ends nothing: the drives are watched on.
@@ -86,7 +92,7 @@ pub struct Args {
 }
 
 pub async fn run(args: Args) -> Result<(), Failure> {
-    let config = Config::load_workable(&args.config)?;
+    let config = Config::load_to_begin(&args.config)?;
     for doubt in config.doubts() {
         tracing::warn!("{doubt}");
     }
@@ -137,6 +143,9 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let by_profile = tokio::spawn(by_profile);
     let faces = Faces::open(faces, Surroundings::new(plant.clone(), doors.audit(), names.clone()));
     let shutdown = config.shutdown;
+    if config.lines.is_empty() {
+        tell_beginning(&args.config);
+    }
     let reloader =
         Reloader::new(plant.clone(), notify.clone(), names, faces.clone(), opened, args.config, config);
     let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
@@ -200,6 +209,15 @@ pub async fn run(args: Args) -> Result<(), Failure> {
         closing::close(&line).await;
     }
     ended.and(read.unwrap_or(Ok(())))
+}
+
+/// Says what is done first where there is no drive yet.
+fn tell_beginning(file: &Path) {
+    let file = file.display();
+    tracing::warn!(
+        "no drive yet: drived scan --line PORT,19200,8E1 --save {file} finds those of a port and writes them down, read only; then \
+         drived reload"
+    );
 }
 
 /// Gives what there is its numbers and topics, and says in the log what has changed.

@@ -101,14 +101,15 @@ pub(crate) struct ConfigArgs {
 impl ConfigArgs {
     /// What the file says of the doors.
     pub(crate) fn doors(&self) -> Result<DoorsConfig, Failure> {
-        let config = Config::load(&self.config).map_err(|error| Failure::Input(error.to_string()))?;
+        let config =
+            Config::load_or_empty(&self.config).map_err(|error| Failure::Input(error.to_string()))?;
         Ok(config.doors)
     }
 
     /// A scope, whose drives and groups are all there: one that is misspelt would be for nothing.
     fn known(&self, scope: Option<Scope>) -> Result<Option<Scope>, Failure> {
         let Some(scope) = scope else { return Ok(None) };
-        let config = Config::load(&self.config).map_err(input)?;
+        let config = Config::load_or_empty(&self.config).map_err(input)?;
         let drives = config.lines.iter().flat_map(|line| &line.drives).map(|drive| &drive.settings.name);
         let groups = config.groups.iter().map(|group| &group.name);
         let missing =

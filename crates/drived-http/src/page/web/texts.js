@@ -82,7 +82,7 @@ const TABLE = {
   given_since: ['since {time}', 'depuis {time}'],
   given_by: ['by {who}, {time}', 'par {who}, {time}'],
   given_by_now: ['{who} set {value}', '{who} a réglé {value}'],
-  no_drives: ['No drive is configured yet.', 'Aucun variateur n’est encore configuré.'],
+  no_drives: ['No drive is configured yet. On this host, drived scan --line PORT,19200,8E1 --save drives.toml finds those of a port and writes them down, only read; then drived reload. Nothing is written to a drive by it.', 'Aucun variateur n’est encore configuré. Sur cet hôte, drived scan --line PORT,19200,8E1 --save drives.toml trouve ceux d’un port et les note, en lecture seule ; ensuite drived reload. Rien n’est écrit dans un variateur.'],
 
   // The alarms.
   alarm_line_away: ['the port of the line is away, none of its drives can be reached', 'le port de la ligne est absent, aucun de ses variateurs n’est joignable'],
