@@ -4,6 +4,7 @@ pub mod alarms;
 pub mod commands;
 pub mod history;
 pub mod parameters;
+pub mod past;
 mod progress;
 pub mod recent;
 pub mod revisions;
@@ -71,6 +72,7 @@ struct Inner {
     tally: Tally,
     usage: Usage,
     alarms: alarms::Desk,
+    past: RwLock<Option<Arc<dyn past::Past>>>,
 }
 
 impl Plant {
@@ -98,6 +100,7 @@ impl Plant {
             tally: Tally::default(),
             usage: Usage::default(),
             alarms: alarms::Desk::new(kept),
+            past: RwLock::default(),
         });
         watching::start(&inner);
         history::start(&inner);
