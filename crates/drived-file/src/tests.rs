@@ -96,7 +96,7 @@ fn what_a_file_says_of_the_far_end_goes_before_what_stands_behind_the_port() {
 fn parsed(text: &str) -> Result<Config, ConfigError> {
     static FACES: Once = Once::new();
     FACES.call_once(|| {
-        [drived_gateway::FACE, drived_broker::FACE, drived_webhook::FACE]
+        [drived_gateway::FACE, drived_history::FACE, drived_broker::FACE, drived_webhook::FACE]
             .map(drived_face::add)
             .into_iter()
             .for_each(Result::unwrap);
@@ -429,7 +429,7 @@ fn others_than_this_machine_are_let_in_by_tokens_and_by_encryption_alone() {
 
 #[test]
 fn a_gateway_is_off_unless_configured_and_says_what_it_lacks() {
-    assert!(read(FULL).unwrap().faces.is_empty());
+    assert!(read(FULL).unwrap().faces.iter().all(|(table, _)| *table == "history"));
     let with = |entry: &str| read(&format!("{FULL}\n[[gateways]]\n{entry}\n"));
     let config = with("line = \"north\"").unwrap();
     let All(gateways) = face(&config, "gateways").unwrap();
@@ -521,7 +521,7 @@ fn with_broker(section: &str) -> Result<MqttConfig, String> {
 
 #[test]
 fn without_a_section_nothing_is_told_to_a_broker_and_nobody_commands_unless_it_is_said() {
-    assert!(read(BROKER).unwrap().faces.is_empty());
+    assert!(read(BROKER).unwrap().faces.iter().all(|(table, _)| *table == "history"));
     let mqtt =
         with_broker("[mqtt]\nservers = [\"mqtts://broker\", \"mqtt://[::1]:1884\"]\nbase = \"plant/north\"")
             .unwrap();
@@ -722,7 +722,7 @@ fn a_key_that_says_its_default_changes_nothing() {
             let Some(default) = key.default().trim_end_matches(" ¹").strip_prefix('`') else { continue };
             let Some(default) = default.strip_suffix('`') else { continue };
             let is_value =
-                default.starts_with('"') || default.parse::<bool>().is_ok() || default.parse::<u8>().is_ok();
+                default.starts_with('"') || default.parse::<bool>().is_ok() || default.parse::<u32>().is_ok();
             let said = if is_value { default.to_owned() } else { format!("{default:?}") };
             let said = format!("{} = {said}", key.name);
             let config = match &*head {
@@ -733,6 +733,7 @@ fn a_key_that_says_its_default_changes_nothing() {
                 _ if key.name == "on_client_silence" => continue,
                 "`[[gateways]]`" => file(["", "", "", &said, ""]),
                 "`[[webhooks]]`" => file(["", "", "", "", &said]),
+                "`[history]`" => file(["", "", "", "", &format!("[history]\n{said}")]),
                 _ if key.name == "control" => continue,
                 _ => file(["", "", &said, "", ""]),
             };

@@ -1,10 +1,11 @@
 //! The black box as a [`Face`]: it is there also where the file says nothing of it.
 
-use std::{any::Any, pin::Pin, thread::JoinHandle, time::Duration};
+use std::{any::Any, pin::Pin, sync::Arc, thread::JoinHandle, time::Duration};
 
 use drived_config::config::Entry as _;
 use drived_face::{
-    ConfigError, Configured, Face, Failure, Key, Meaning, Open, Opening, Site, Surroundings, Written, same,
+    ConfigError, Configured, Face, Failure, Key, Meaning, Open, Opening, Plant, Site, Surroundings, Written,
+    same,
 };
 use serde_json::{Map, Value, json};
 use tokio::sync::watch;
@@ -12,6 +13,7 @@ use tokio::sync::watch;
 use crate::{
     config::{HistoryConfig, HistoryEntry},
     listen::{Clocks, Listening},
+    past::InFile,
     write::{
         inbox::Inbox,
         writer::{Health, Writer},
@@ -122,6 +124,7 @@ fn mebibytes(bytes: u64) -> String {
 struct Recorder(Option<Recording>);
 
 struct Recording {
+    plant: Plant,
     listening: Listening,
     inbox: Inbox,
     writing: Option<JoinHandle<()>>,
@@ -130,6 +133,7 @@ struct Recording {
 impl Recorder {
     fn open(config: HistoryConfig, around: &Surroundings) -> Self {
         let Some(path) = config.file else { return Self(None) };
+        around.plant.set_past(Some(Arc::new(InFile(path.clone()))));
         let (inbox, clocks) = (Inbox::default(), Clocks::begin());
         let (health, seen) = watch::channel(Health::Opening);
         let listening = Listening::start(&around.plant, &inbox, clocks, seen);
@@ -140,7 +144,8 @@ impl Recorder {
         if let Err(error) = &writing {
             health.send_replace(Health::Failing(error.to_string()));
         }
-        Self(Some(Recording { listening, inbox, writing: writing.ok() }))
+        let plant = around.plant.clone();
+        Self(Some(Recording { plant, listening, inbox, writing: writing.ok() }))
     }
 }
 
@@ -150,7 +155,8 @@ impl Open for Recorder {
 
     fn close(self: Box<Self>) -> Pin<Box<dyn Future<Output = ()> + Send>> {
         Box::pin(async move {
-            let Some(Recording { listening, inbox, writing }) = self.0 else { return };
+            let Some(Recording { plant, listening, inbox, writing }) = self.0 else { return };
+            plant.set_past(None);
             drop(listening);
             inbox.end();
             let joined = tokio::task::spawn_blocking(move || writing.map(JoinHandle::join));

@@ -15,8 +15,8 @@ const BYTES: u64 = 3;
 /// Bytes of a minute, and of an hour, of one number.
 const MINUTE_BYTES: u64 = 6;
 const HOUR_BYTES: u64 = 30;
-/// Bytes of what happens to a drive in a day: sixty events with what the API tells of each.
-const RECORD_BYTES: u64 = 60 * 1_200;
+/// Bytes of what happens to a drive in a day: ten events with what the API tells of each.
+const RECORD_BYTES: u64 = 10 * 1_200;
 /// A value is written to the log of the file, to the file, and both again in its block; a page is more than what is in it.
 const WRITTEN_TIMES: u64 = 5;
 

@@ -19,6 +19,7 @@ pub mod curve;
 mod face;
 pub mod forecast;
 mod listen;
+mod past;
 pub mod quantity;
 pub mod read;
 pub mod record;

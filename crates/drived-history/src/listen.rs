@@ -157,11 +157,13 @@ fn read(set: Set, snapshot: &Snapshot) -> Option<Reading> {
 /// Keeps what the event stream tells.
 async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
     let mut reader = plant.revisions().reader(None);
+    let mut alarms = Alarms::default();
     loop {
         match plant.revisions().next(&mut reader).await {
             Next::Frames(frames) => {
                 for frame in frames {
-                    let told = std::str::from_utf8(&frame).ok().and_then(|frame| said(frame, clocks.now()));
+                    let frame = std::str::from_utf8(&frame).ok();
+                    let told = frame.and_then(|frame| said(frame, clocks.now(), &mut alarms));
                     let Some(mut record) = told else { continue };
                     // Whoever asks what else happened on a line finds it by that.
                     if let (None, Some(drive)) = (&record.line, &record.drive) {
@@ -191,6 +193,8 @@ struct Told {
 /// An alarm likewise.
 #[derive(Deserialize)]
 struct ToldAlarm {
+    id: u64,
+    count: u32,
     state: String,
     #[serde(default)]
     drive: Option<String>,
@@ -199,8 +203,23 @@ struct ToldAlarm {
     text: String,
 }
 
+/// The alarms as they were kept last, by their numbers: one that stands for others is told anew with each of them.
+#[derive(Debug, Default)]
+struct Alarms(BTreeMap<u64, (String, u32, String)>);
+
+impl Alarms {
+    /// Whether it is another than it was.
+    fn is_new(&mut self, ToldAlarm { id, count, state, text, .. }: &ToldAlarm) -> bool {
+        let now = (state.clone(), *count, text.clone());
+        match state == "over" {
+            true => self.0.remove(id).is_some(),
+            false => self.0.insert(*id, now.clone()).is_none_or(|before| before != now),
+        }
+    }
+}
+
 /// What a frame of the event stream says, as a record; `None`: it is of a drive's or a line's values.
-fn said(frame: &str, now: Moment) -> Option<Record> {
+fn said(frame: &str, now: Moment, alarms: &mut Alarms) -> Option<Record> {
     let (head, data) = frame.split_once("\ndata: ")?;
     let (_, name) = head.split_once("\nevent: ")?;
     let data = data.trim_end();
@@ -215,7 +234,11 @@ fn said(frame: &str, now: Moment) -> Option<Record> {
             Some(Record { at, kind, what: event, drive, is_alarm: alarm, text, ..record })
         }
         "alarm" => {
-            let ToldAlarm { state, drive, line, text } = serde_json::from_str(data).ok()?;
+            let told: ToldAlarm = serde_json::from_str(data).ok()?;
+            if !alarms.is_new(&told) {
+                return None;
+            }
+            let ToldAlarm { state, drive, line, text, .. } = told;
             let is_alarm = state == "unacknowledged";
             Some(Record { kind: Kind::Alarm, what: state, drive, line, is_alarm, text, ..record })
         }
@@ -315,5 +338,27 @@ async fn tell(plant: Plant, mut health: watch::Receiver<Health>) {
         if health.changed().await.is_err() {
             return;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_alarm_that_is_told_again_for_those_that_follow_from_it_is_kept_once() {
+        let now = Moment { steady_ms: 0, wall_ms: 0 };
+        let mut alarms = Alarms::default();
+        let mut told = |state: &str, count: u32, members: u32| {
+            let data = serde_json::json!({
+                "id": 7, "count": count, "state": state, "line": "north", "text": "no drive answers", "members": members,
+            });
+            said(&format!("id: 1\nevent: alarm\ndata: {data}\n\n"), now, &mut alarms).is_some()
+        };
+        assert!(
+            told("unacknowledged", 1, 1) && !told("unacknowledged", 1, 2) && !told("unacknowledged", 1, 3)
+        );
+        assert!(told("acknowledged", 1, 3) && told("unacknowledged", 2, 3));
+        assert!(told("over", 2, 0) && told("unacknowledged", 1, 0), "it has come anew");
     }
 }

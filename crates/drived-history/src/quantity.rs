@@ -4,6 +4,9 @@ use std::fmt;
 
 use drive_core::{Control, Frequency, Measurements, Motion, Setpoint, State, Status};
 use drive_fleet::Snapshot;
+use drived_plant::plant::past::{IsView, PointView};
+
+use crate::column::Point;
 
 /// Which of a drive's two sets holds a quantity: each is read at its own times, and grows old at its own age.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -202,6 +205,16 @@ impl Quantity {
             _ => 3,
         };
         format!("{:.places$}", self.value(count as f64))
+    }
+
+    /// A point as the API tells it.
+    #[must_use]
+    pub fn point(self, point: Point) -> PointView {
+        let is = |count: i64| match self.is_number() {
+            true => IsView::Number(self.value(count as f64)),
+            false => IsView::Word(self.text(count)),
+        };
+        PointView { time_unix_ms: point.at, is: point.count.map(is) }
     }
 
     /// Whether its counts stand for words or bits, so that a mean of them means nothing.

@@ -13,12 +13,12 @@ use rusqlite::{Connection, OptionalExtension as _, params};
 
 pub use self::{
     frames::{Frame, frames},
-    records::{Filter, Found, records},
-    steps::{Told, pack_minutes, steps},
+    records::{Filter, records},
+    steps::{pack_minutes, steps},
 };
 use crate::{
     chunk::{Chunk, piece_of},
-    column::unpack,
+    column::{Point, unpack},
     curve::{Piece, joined},
     quantity::{Quantity, Set},
     store::{self, StoreError},
@@ -80,6 +80,23 @@ pub fn quantities(
     Ok(all)
 }
 
+/// The quantities of a drive of which anything is kept, in whichever form.
+///
+/// # Errors
+/// It cannot be read.
+pub fn all_quantities(connection: &Connection, drive: &str) -> Result<Vec<Quantity>, StoreError> {
+    let mut all = quantities(connection, drive, i64::MIN, i64::MAX)?;
+    let mut find = connection.prepare_cached(
+        "SELECT id FROM quantity AS one WHERE EXISTS
+            (SELECT 1 FROM source JOIN hour ON hour.source = source.id AND hour.quantity = one.id WHERE drive = ?1)",
+    )?;
+    let rows = find.query_map([drive], |row| row.get(0).map(Quantity))?;
+    for quantity in rows {
+        all.insert(quantity?);
+    }
+    Ok(all.into_iter().collect())
+}
+
 /// What is known of a quantity between two moments, as it was read: one piece for each time the clock was not set in.
 ///
 /// # Errors
@@ -120,6 +137,79 @@ pub fn pieces(
             .extend(whole.and_then(|whole| whole.between(from, to)).filter(|piece| !piece.points.is_empty()));
     }
     Ok(pieces)
+}
+
+/// The same as points, each in its turn: what is read of a long time is never in memory at once. It ends when `each` says `false`.
+///
+/// # Errors
+/// It cannot be read, or `each` fails.
+pub fn points<E: From<StoreError>>(
+    connection: &Connection,
+    drive: &str,
+    quantity: Quantity,
+    from: i64,
+    to: i64,
+    mut each: impl FnMut(Point) -> Result<bool, E>,
+) -> Result<(), E> {
+    // Where what was told last ends, and what held there.
+    let mut open: Option<(i64, i64)> = None;
+    let (from, to) = kept(connection, drive, quantity, from, to)?;
+    for (start, end) in windows(from, to) {
+        for piece in pieces(connection, drive, quantity, start, end)? {
+            let first = piece.points.first().copied();
+            let goes_on = open.is_some_and(|(until, count)| {
+                until == piece.start && first == Some(Point { at: until, count: Some(count) })
+            });
+            if let (Some((until, _)), false) = (open, goes_on)
+                && !each(Point { at: until + 1, count: None })?
+            {
+                return Ok(());
+            }
+            let last = piece.points.last().and_then(|point| point.count);
+            for point in piece.points.into_iter().skip(usize::from(goes_on)) {
+                if !each(point)? {
+                    return Ok(());
+                }
+            }
+            open = last.map(|count| (piece.end, count));
+        }
+    }
+    if let Some((until, _)) = open {
+        each(Point { at: until + 1, count: None })?;
+    }
+    Ok(())
+}
+
+/// The part of a time from which there may be points of a quantity.
+fn kept(
+    connection: &Connection,
+    drive: &str,
+    quantity: Quantity,
+    from: i64,
+    to: i64,
+) -> Result<(i64, i64), StoreError> {
+    let mut find = connection.prepare_cached("SELECT min(start_ms), max(end_ms) FROM flush")?;
+    let (mut first, mut last): (Option<i64>, Option<i64>) =
+        find.query_row([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+    for source in Set::ALL.into_iter().filter_map(|set| source(connection, drive, set).transpose()) {
+        let mut find = connection.prepare_cached(
+            "SELECT min(start_ms), max(start_ms) FROM block WHERE source = ?1 AND quantity = ?2",
+        )?;
+        let (oldest, newest): (Option<i64>, Option<i64>) =
+            find.query_row(params![source?, quantity.0], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        first = [first, oldest].into_iter().flatten().min();
+        last = [last, newest.map(|start| start.saturating_add(LONGEST_BLOCK_MS))].into_iter().flatten().max();
+    }
+    Ok((from.max(first.unwrap_or(i64::MAX)), to.min(last.unwrap_or(i64::MIN))))
+}
+
+/// A time in parts of six hours, each of which begins where the one before ends.
+fn windows(from: i64, to: i64) -> impl Iterator<Item = (i64, i64)> {
+    const WINDOW_MS: i64 = 6 * 3_600_000;
+    let first = (from <= to).then_some((from, from.saturating_add(WINDOW_MS).min(to)));
+    std::iter::successors(first, move |(_, end)| {
+        (*end < to).then(|| (*end, end.saturating_add(WINDOW_MS).min(to)))
+    })
 }
 
 /// The number of a set of a drive.

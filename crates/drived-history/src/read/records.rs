@@ -1,8 +1,7 @@
 //! What happened, in words.
 
+use drived_plant::plant::past::RecordView;
 use rusqlite::{Connection, params};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
 use crate::store::StoreError;
@@ -22,38 +21,11 @@ pub struct Filter<'a> {
     pub after: i64,
 }
 
-/// Something that happened.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-pub struct Found {
-    /// Its place in the order of the file, which the wall's clock does not change.
-    pub number: i64,
-    /// The run of the daemon.
-    pub run: i64,
-    /// By the wall's clock as it stood then.
-    pub time_unix_ms: i64,
-    /// By the daemon's own clock, since its run began.
-    pub steady_ms: i64,
-    /// `event`, `command`, `alarm`, `notice`, or `history`: what the black box tells of itself.
-    pub kind: String,
-    /// In one word.
-    pub what: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub drive: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub line: Option<String>,
-    pub alarm: bool,
-    pub text: String,
-    /// As the API told it then.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<serde_json::Value>")]
-    pub body: Option<Box<RawValue>>,
-}
-
 /// What happened, in the daemon's own order.
 ///
 /// # Errors
 /// It cannot be read.
-pub fn records(connection: &Connection, filter: &Filter<'_>) -> Result<Vec<Found>, StoreError> {
+pub fn records(connection: &Connection, filter: &Filter<'_>) -> Result<Vec<RecordView>, StoreError> {
     let mut find = connection.prepare_cached(
         "SELECT id, run, wall_ms, steady_ms, kind, what, drive, line, alarm, text, body FROM record
          WHERE wall_ms BETWEEN ?1 AND ?2 AND id > ?3
@@ -64,7 +36,7 @@ pub fn records(connection: &Connection, filter: &Filter<'_>) -> Result<Vec<Found
     let rows = find.query_map(
         params![filter.from_ms, filter.to_ms, filter.after, filter.drive, filter.kind, limit],
         |row| {
-            Ok(Found {
+            Ok(RecordView {
                 number: row.get(0)?,
                 run: row.get(1)?,
                 time_unix_ms: row.get(2)?,

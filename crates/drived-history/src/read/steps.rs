@@ -1,10 +1,9 @@
 //! What is known of a quantity in steps of equal length.
 
+use drived_plant::plant::past::StepView;
 use rusqlite::{Connection, params};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-use super::{chunks, pieces, source};
+use super::{chunks, kept, pieces, source, windows};
 use crate::{
     chunk::piece_of,
     column::{pack_numbers, unpack_numbers},
@@ -15,18 +14,6 @@ use crate::{
 
 const MINUTE_MS: i64 = 60_000;
 const HOUR_MS: i64 = 3_600_000;
-
-/// One step, in the quantity's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Told {
-    /// When it begins, in milliseconds since 1970.
-    pub start_unix_ms: i64,
-    pub least: f64,
-    pub mean: f64,
-    pub greatest: f64,
-    /// The share of the step for which something is known, from 0 to 1.
-    pub known: f64,
-}
 
 /// The steps of a quantity between two moments; a step of which nothing is known is not there. From a minute on they are summed up from
 /// what was kept in minutes, or, where that is not kept any more, in hours: those stand at the beginning of their hour.
@@ -40,12 +27,15 @@ pub fn steps(
     from: i64,
     to: i64,
     length_ms: i64,
-) -> Result<Vec<Told>, StoreError> {
+) -> Result<Vec<StepView>, StoreError> {
     let length_ms = length_ms.max(1);
     let from = from - from.rem_euclid(length_ms);
     let mut steps = Steps::of(length_ms);
     if length_ms % MINUTE_MS != 0 || !quantity.is_number() {
-        pieces(connection, drive, quantity, from, to)?.into_iter().for_each(|piece| steps.add(piece));
+        let (first, last) = kept(connection, drive, quantity, from, to)?;
+        for (start, end) in windows(first, last) {
+            pieces(connection, drive, quantity, start, end)?.into_iter().for_each(|piece| steps.add(piece));
+        }
     } else {
         for source in Set::ALL.into_iter().filter_map(|set| source(connection, drive, set).transpose()) {
             let source = source?;
@@ -69,7 +59,7 @@ pub fn steps(
             }
         }
     }
-    let told = |(start, step): (i64, Step)| Told {
+    let told = |(start, step): (i64, Step)| StepView {
         start_unix_ms: start,
         least: quantity.value(step.least as f64),
         mean: quantity.value(step.mean),

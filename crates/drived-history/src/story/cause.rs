@@ -1,11 +1,11 @@
 //! Why something happened, as far as the facts say so.
 
-use super::{
+use drived_plant::plant::past::{
     Certainty::{Likely, NotKnown, Said, Seen},
-    Sentence,
-    facts::{Cause, Facts, body},
+    RecordView, SentenceView as Sentence,
 };
-use crate::read::Found;
+
+use super::facts::{Cause, Facts, body};
 
 /// What comes within this time of each other may have one cause.
 const TOGETHER_MS: i64 = 5_000;
@@ -15,7 +15,7 @@ const OBEYED_MS: i64 = 10_000;
 const SILENT_MS: i64 = 90_000;
 
 /// Why this happened, the surest first. It is never empty.
-pub(super) fn causes(facts: &Facts, about: &Found) -> Vec<Sentence> {
+pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     let mut said = match &*about.what {
         "tripped" => of_trip(facts, about),
         "lost" => of_loss(facts, about),
@@ -38,21 +38,19 @@ pub(super) fn causes(facts: &Facts, about: &Found) -> Vec<Sentence> {
     said
 }
 
-fn of_trip(facts: &Facts, about: &Found) -> Vec<Sentence> {
+fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     let at = about.time_unix_ms;
-    let fault = body(about).fault;
-    let (by_watchdog, is_found) = fault.map_or((false, false), |fault| (fault.by_watchdog, fault.found));
     // What the drive said of it was read a moment later.
-    let explained = facts.records.iter().find(|found| {
-        found.what == "trip_explained" && found.number > about.number && facts.is_of_drive(found)
+    let explained = facts.explained(about);
+    let faults = [Some(about), explained].into_iter().flatten().filter_map(|found| body(found).fault);
+    let (by_watchdog, is_found) = faults.fold((false, false), |(by_watchdog, is_found), fault| {
+        (by_watchdog || fault.by_watchdog, is_found || fault.found)
     });
-    let text = explained.map_or(&about.text, |explained| &explained.text);
+    let text = facts.in_words(about);
     let mut said = vec![Sentence::of(Said, format!("the drive itself says what it tripped by: {text}"))];
     if is_found {
-        said.push(Sentence::of(
-            NotKnown,
-            "it was found tripped when it was seen again: when that happened is not known",
-        ));
+        let text = "it was found tripped when it was seen again: when that happened is not known";
+        said.push(Sentence::of(NotKnown, text));
     }
     if by_watchdog {
         said.extend(of_silence(facts, at));
@@ -61,7 +59,8 @@ fn of_trip(facts: &Facts, about: &Found) -> Vec<Sentence> {
     }
     let (tripped, lost) =
         (facts.elsewhere("tripped", at, TOGETHER_MS), facts.elsewhere("lost", at, TOGETHER_MS));
-    if !tripped.is_empty() || !lost.is_empty() {
+    // Those whose watchdog acted share the line, and what became of that is told above.
+    if !by_watchdog && (!tripped.is_empty() || !lost.is_empty()) {
         let mut parts = Vec::new();
         if !tripped.is_empty() {
             parts.push(format!("{} tripped", names(&tripped)));
@@ -87,7 +86,7 @@ fn of_trip(facts: &Facts, about: &Found) -> Vec<Sentence> {
 
 /// Why a drive heard nothing for so long that its watchdog acted.
 fn of_silence(facts: &Facts, at: i64) -> Vec<Sentence> {
-    let within = |found: &&Found| (at - SILENT_MS..=at).contains(&found.time_unix_ms);
+    let within = |found: &&RecordView| (at - SILENT_MS..=at).contains(&found.time_unix_ms);
     let own = facts
         .records
         .iter()
@@ -109,7 +108,7 @@ fn of_silence(facts: &Facts, at: i64) -> Vec<Sentence> {
     }
 }
 
-fn of_loss(facts: &Facts, about: &Found) -> Vec<Sentence> {
+fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     let at = about.time_unix_ms;
     let away = facts.records.iter().find(|found| {
         let is_near = (found.time_unix_ms - at).abs() <= 4 * TOGETHER_MS;
@@ -128,7 +127,7 @@ fn of_loss(facts: &Facts, about: &Found) -> Vec<Sentence> {
     }
     let neighbours = facts.neighbours();
     let lost = facts.elsewhere("lost", at, 2 * TOGETHER_MS);
-    let on_line: Vec<&Found> = lost.into_iter().filter(|found| found.line == facts.line).collect();
+    let on_line: Vec<&RecordView> = lost.into_iter().filter(|found| found.line == facts.line).collect();
     match on_line.len() {
         0 => {
             let others = match neighbours.is_empty() {
@@ -153,7 +152,7 @@ fn of_loss(facts: &Facts, about: &Found) -> Vec<Sentence> {
     }
 }
 
-fn of_change(facts: &Facts, about: &Found) -> Vec<Sentence> {
+fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     match body(about).cause {
         Some(Cause::Command { commander, door }) => {
             let door = door.map(|door| format!(" through {door}")).unwrap_or_default();
@@ -190,7 +189,7 @@ fn of_change(facts: &Facts, about: &Found) -> Vec<Sentence> {
     }
 }
 
-fn of_unconfirmed_stop(facts: &Facts, about: &Found) -> Vec<Sentence> {
+fn of_unconfirmed_stop(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     let mut said = Vec::new();
     if let Some(asked) = asked_before(facts, about, &["stop"]) {
         said.push(
@@ -217,7 +216,7 @@ fn of_unconfirmed_stop(facts: &Facts, about: &Found) -> Vec<Sentence> {
 
 /// What the program itself has to do with it: it was not there, or its clock was set.
 fn program(facts: &Facts, at: i64) -> Vec<Sentence> {
-    let is_near = |found: &&Found| {
+    let is_near = |found: &&RecordView| {
         found.kind == "history" && (at - SILENT_MS..=at + TOGETHER_MS).contains(&found.time_unix_ms)
     };
     facts
@@ -232,7 +231,7 @@ fn program(facts: &Facts, at: i64) -> Vec<Sentence> {
 }
 
 /// The last command to the drive shortly before something, of these actions.
-fn asked_before<'a>(facts: &'a Facts, about: &Found, actions: &[&str]) -> Option<&'a Found> {
+fn asked_before<'a>(facts: &'a Facts, about: &RecordView, actions: &[&str]) -> Option<&'a RecordView> {
     let at = about.time_unix_ms;
     facts.records.iter().rev().find(|found| {
         found.kind == "command"
@@ -244,12 +243,12 @@ fn asked_before<'a>(facts: &'a Facts, about: &Found, actions: &[&str]) -> Option
 }
 
 /// Whether a command was, or may have been, on the wire: one that was refused moved nothing.
-fn was_sent(facts: &Facts, found: &Found) -> bool {
+fn was_sent(facts: &Facts, found: &RecordView) -> bool {
     let outcome = facts.of_several(found).map(|one| one.outcome).or_else(|| body(found).outcome);
     !matches!(outcome.as_deref(), Some("refused" | "expired" | "superseded" | "nothing"))
 }
 
-fn body_of_alarm(found: &Found) -> Option<String> {
+fn body_of_alarm(found: &RecordView) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Alarm {
         kind: String,
@@ -258,7 +257,7 @@ fn body_of_alarm(found: &Found) -> Option<String> {
     Some(alarm.kind)
 }
 
-fn names(found: &[&Found]) -> String {
+fn names(found: &[&RecordView]) -> String {
     let mut names: Vec<&str> = found.iter().filter_map(|found| found.drive.as_deref()).collect();
     names.sort_unstable();
     names.dedup();

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeSet;
 
+use drived_plant::plant::past::RecordView;
 use rusqlite::Connection;
 use serde::Deserialize;
 
 use crate::{
     quantity::Quantity,
-    read::{Filter, Found, pieces, records},
+    read::{Filter, pieces, records},
     store::StoreError,
 };
 
@@ -25,7 +26,7 @@ pub(super) struct Facts {
     pub(super) from: i64,
     pub(super) to: i64,
     /// Of the whole plant, in the daemon's order.
-    pub(super) records: Vec<Found>,
+    pub(super) records: Vec<RecordView>,
     pub(super) is_cut: bool,
     /// How much of the time something is known of the drive, from 0 to 1.
     pub(super) known: f64,
@@ -38,10 +39,11 @@ const GAP_MS: i64 = 5_000;
 
 impl Facts {
     pub(super) fn gather(connection: &Connection, drive: &str, at: i64) -> Result<Self, StoreError> {
-        let (from, to) = (at - BEFORE_MS, at + AFTER_MS);
+        let (first, last) = kept(connection)?;
+        let (from, to) = ((at - BEFORE_MS).max(first), (at + AFTER_MS).min(last));
         let filter = Filter { from_ms: from, to_ms: to, limit: RECORDS, ..Filter::default() };
         let records = records(connection, &filter)?;
-        let of_drive = |found: &&Found| found.drive.as_deref() == Some(drive);
+        let of_drive = |found: &&RecordView| found.drive.as_deref() == Some(drive);
         let line = records.iter().filter(of_drive).find_map(|found| found.line.clone());
         let spans: Vec<(i64, i64)> = pieces(connection, drive, Quantity::STATE, from, to)?
             .into_iter()
@@ -60,17 +62,17 @@ impl Facts {
             gaps.push((until, to));
         }
         let is_cut = records.len() >= RECORDS;
-        let known = known as f64 / (to - from) as f64;
+        let known = known as f64 / (to - from).max(1) as f64;
         Ok(Self { drive: drive.to_owned(), line, from, to, records, is_cut, known, gaps })
     }
 
     /// Whether a record is of this drive: what happened to it, or a command that was for it too.
-    pub(super) fn is_of_drive(&self, found: &Found) -> bool {
+    pub(super) fn is_of_drive(&self, found: &RecordView) -> bool {
         found.drive.as_deref() == Some(&*self.drive) || self.of_several(found).is_some()
     }
 
     /// What became of a command for several at this drive.
-    pub(super) fn of_several(&self, found: &Found) -> Option<OfOne> {
+    pub(super) fn of_several(&self, found: &RecordView) -> Option<OfOne> {
         if found.kind != "command" || found.drive.is_some() {
             return None;
         }
@@ -78,16 +80,31 @@ impl Facts {
         several.drives.into_iter().find(|one| one.drive.as_deref() == Some(&*self.drive))
     }
 
+    /// What the drive said of a trip, where that was read.
+    pub(super) fn explained(&self, trip: &RecordView) -> Option<&RecordView> {
+        let is_it = |found: &&RecordView| {
+            found.what == "trip_explained" && found.number > trip.number && self.is_of_drive(found)
+        };
+        self.records.iter().find(is_it).filter(|_| trip.what == "tripped")
+    }
+
+    /// An event in words, a trip with what the drive said of it.
+    pub(super) fn in_words(&self, found: &RecordView) -> String {
+        let explained =
+            self.explained(found).map(|explained| explained.text.replacen("trip explained", "tripped", 1));
+        explained.unwrap_or_else(|| found.text.clone())
+    }
+
     /// The other drives of its line.
     pub(super) fn neighbours(&self) -> BTreeSet<&str> {
-        let is_near = |found: &&Found| self.line.is_some() && found.line == self.line;
+        let is_near = |found: &&RecordView| self.line.is_some() && found.line == self.line;
         let names = self.records.iter().filter(is_near).filter_map(|found| found.drive.as_deref());
         names.filter(|name| *name != self.drive).collect()
     }
 
     /// Events of this name at other drives, not farther from a moment than this.
-    pub(super) fn elsewhere(&self, what: &str, at: i64, within: i64) -> Vec<&Found> {
-        let is_one = |found: &&Found| {
+    pub(super) fn elsewhere(&self, what: &str, at: i64, within: i64) -> Vec<&RecordView> {
+        let is_one = |found: &&RecordView| {
             found.kind == "event"
                 && found.what == what
                 && found.drive.as_deref().is_some_and(|drive| drive != self.drive)
@@ -95,6 +112,18 @@ impl Facts {
         };
         self.records.iter().filter(is_one).collect()
     }
+}
+
+/// When the history begins, and when it ends now.
+fn kept(connection: &Connection) -> Result<(i64, i64), StoreError> {
+    let bounds = connection.query_row(
+        "SELECT (SELECT min(wall_ms) FROM record),
+                max((SELECT max(wall_ms) FROM record), (SELECT coalesce(max(end_ms), 0) FROM flush),
+                    (SELECT coalesce(max(end_ms), 0) FROM block WHERE id = (SELECT max(id) FROM block)))",
+        [],
+        |row| Ok((row.get::<_, Option<i64>>(0)?, row.get::<_, Option<i64>>(1)?)),
+    )?;
+    Ok((bounds.0.unwrap_or(i64::MAX / 2), bounds.1.unwrap_or(i64::MIN / 2)))
 }
 
 /// The times in which something is known, of points that end with nothing.
@@ -179,6 +208,6 @@ pub(super) struct Word {
 }
 
 /// What the API told of it; nothing where that was not kept or is of another kind.
-pub(super) fn body(found: &Found) -> Body {
+pub(super) fn body(found: &RecordView) -> Body {
     found.body.as_ref().and_then(|body| serde_json::from_str(body.get()).ok()).unwrap_or_default()
 }

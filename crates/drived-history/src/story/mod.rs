@@ -8,65 +8,11 @@ mod facts;
 #[cfg(test)]
 mod tests;
 
+use drived_plant::plant::past::{Certainty, RecordView, SentenceView as Sentence, StoryView as Story};
 use rusqlite::Connection;
-use serde::Serialize;
 
 use self::facts::{Facts, body};
-use crate::{
-    quantity::Quantity,
-    read::{Found, pieces},
-    store::StoreError,
-};
-
-/// How sure a sentence is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Certainty {
-    /// It was seen here.
-    Seen,
-    /// The drive says so.
-    Said,
-    /// The facts speak for it, and something else is possible.
-    Likely,
-    /// It is not known.
-    NotKnown,
-}
-
-/// One sentence, with its time where it has one.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Sentence {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub time_unix_ms: Option<i64>,
-    pub certainty: Certainty,
-    pub text: String,
-}
-
-impl Sentence {
-    fn of(certainty: Certainty, text: impl Into<String>) -> Self {
-        Self { time_unix_ms: None, certainty, text: text.into() }
-    }
-
-    fn at(self, time_unix_ms: i64) -> Self {
-        Self { time_unix_ms: Some(time_unix_ms), ..self }
-    }
-}
-
-/// The story of a drive around a moment.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Story {
-    pub drive: String,
-    /// What the story is about; absent where nothing happened.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub about: Option<Sentence>,
-    /// Why, as far as it is known.
-    pub why: Vec<Sentence>,
-    /// How it was before.
-    pub before: Vec<Sentence>,
-    /// What happened, in order: to the drive, by somebody, and to its line.
-    pub course: Vec<Sentence>,
-    /// What is not known.
-    pub not_known: Vec<Sentence>,
-}
+use crate::{quantity::Quantity, read::pieces, store::StoreError};
 
 /// So near to a moment is what somebody means who tells its minute.
 const NEAR_BEFORE_MS: i64 = 90_000;
@@ -109,7 +55,7 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
     let why = about.map(|about| cause::causes(&facts, about)).unwrap_or_default();
     Ok(Story {
         drive: drive.to_owned(),
-        about: about.map(|found| Sentence::of(Certainty::Seen, found.text.clone()).at(found.time_unix_ms)),
+        about: about.map(|found| Sentence::of(Certainty::Seen, facts.in_words(found)).at(found.time_unix_ms)),
         why,
         before: before(connection, &facts, moment)?,
         course: course(&facts, moment),
@@ -118,24 +64,26 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
 }
 
 /// What somebody means who asks for this moment: the weightiest near it, else what is nearest to it.
-fn about(facts: &Facts, at: i64) -> Option<&Found> {
-    let weight = |found: &Found| {
+fn about(facts: &Facts, at: i64) -> Option<&RecordView> {
+    let weight = |found: &RecordView| {
         let place = WEIGHT.iter().position(|what| *what == found.what)?;
         // A motor that begins to run, or goes on from one state at rest to another, is no incident.
         (found.what != "state_changed" || ends_a_run(found)).then_some(place)
     };
     let of_drive = || {
-        let is_one = |found: &&Found| matches!(&*found.kind, "event" | "command") && facts.is_of_drive(found);
+        let is_one =
+            |found: &&RecordView| matches!(&*found.kind, "event" | "command") && facts.is_of_drive(found);
         facts.records.iter().filter(is_one).filter_map(|found| Some((weight(found)?, found)))
     };
-    let is_near = |found: &Found| (at - NEAR_BEFORE_MS..=at + NEAR_AFTER_MS).contains(&found.time_unix_ms);
+    let is_near =
+        |found: &RecordView| (at - NEAR_BEFORE_MS..=at + NEAR_AFTER_MS).contains(&found.time_unix_ms);
     let near =
         of_drive().filter(|(_, found)| is_near(found)).min_by_key(|(weight, found)| (*weight, found.number));
     let nearest = || of_drive().min_by_key(|(weight, found)| ((found.time_unix_ms - at).abs(), *weight));
     near.or_else(nearest).map(|(_, found)| found)
 }
 
-fn ends_a_run(found: &Found) -> bool {
+fn ends_a_run(found: &RecordView) -> bool {
     let body = body(found);
     body.from.as_deref() == Some("running") && body.to.as_deref() != Some("running")
 }
@@ -181,7 +129,7 @@ fn before(connection: &Connection, facts: &Facts, moment: i64) -> Result<Vec<Sen
 
 /// What happened around a moment, in the daemon's order.
 fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
-    let is_told = |found: &&Found| {
+    let is_told = |found: &&RecordView| {
         let is_near = (moment - COURSE_BEFORE_MS..=moment + COURSE_AFTER_MS).contains(&found.time_unix_ms);
         let of_line = found.line.is_some() && found.line == facts.line;
         let weighs =
@@ -195,8 +143,16 @@ fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
         };
         is_near && is_meant
     };
-    let told: Vec<&Found> = facts.records.iter().filter(is_told).collect();
-    let mut course: Vec<Sentence> = told.iter().take(COURSE).map(|found| sentence(facts, found)).collect();
+    let told: Vec<&RecordView> = facts.records.iter().filter(is_told).collect();
+    // What several events show that came with one status is told with the first of them.
+    let with_words = |place: usize, found: &RecordView| {
+        let is_same =
+            |before: &&&RecordView| before.time_unix_ms == found.time_unix_ms && before.drive == found.drive;
+        facts.is_of_drive(found) && !told[..place].iter().rev().take(3).any(|before| is_same(&before))
+    };
+    let first = told.iter().take(COURSE).enumerate();
+    let mut course: Vec<Sentence> =
+        first.map(|(place, found)| sentence(facts, found, with_words(place, found))).collect();
     if told.len() > COURSE {
         let text = format!("{} more records follow: drived history tells them all", told.len() - COURSE);
         course.push(Sentence::of(Certainty::Seen, text));
@@ -204,7 +160,7 @@ fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
     course
 }
 
-fn sentence(facts: &Facts, found: &Found) -> Sentence {
+fn sentence(facts: &Facts, found: &RecordView, with_words: bool) -> Sentence {
     let who = match (&found.drive, &found.line) {
         (Some(drive), _) if *drive == facts.drive => String::new(),
         (Some(drive), _) => format!("{drive}: "),
@@ -225,6 +181,7 @@ fn sentence(facts: &Facts, found: &Found) -> Sentence {
     let words: Vec<String> = body
         .words
         .iter()
+        .filter(|_| with_words)
         .map(|word| match word.before {
             Some(before) => format!("{} {before:04X}h to {:04X}h", word.code, word.value),
             None => format!("{} {:04X}h", word.code, word.value),

@@ -22,7 +22,7 @@ use tokio::{
 use super::{Certainty, Story, tell};
 use crate::{
     listen::{Clocks, Listening},
-    record::Moment,
+    record::{Kind, Moment, Record},
     store,
     write::{archive::Archive, inbox::Inbox, writer::Health},
 };
@@ -93,8 +93,14 @@ impl Night {
     }
 }
 
-impl Story {
-    /// Everything that it says of why, of this certainty or surer.
+trait Says {
+    /// Everything that it says of why, of this certainty.
+    fn why(&self, certainty: Certainty) -> String;
+
+    fn course(&self) -> String;
+}
+
+impl Says for Story {
     fn why(&self, certainty: Certainty) -> String {
         let why = self.why.iter().filter(|sentence| sentence.certainty == certainty);
         why.map(|sentence| sentence.text.clone()).collect::<Vec<_>>().join("\n")
@@ -119,6 +125,7 @@ async fn a_trip_is_told_by_what_the_drive_says_and_what_brought_it_there_is_left
     assert_eq!(story.why(Certainty::Likely), "", "nothing else was tripped");
     let neighbour = tell_nothing_of(&story, "pump 2");
     assert!(neighbour, "the other pump ran on: {story:?}");
+    assert_eq!(story.about.unwrap().text, "tripped: 18 ObF: DC bus overvoltage");
 }
 
 fn tell_nothing_of(story: &Story, drive: &str) -> bool {
@@ -200,9 +207,45 @@ async fn a_quiet_night_is_told_as_quiet_with_the_share_that_is_known() {
     sleep(Duration::from_secs(600)).await;
     let story = night.asked("quiet", "pump 1", at).await;
     assert_eq!((story.about, story.course), (None, Vec::new()));
+    assert!(story.not_known.last().unwrap().text.contains("100 % of the"), "{:?}", story.not_known);
+}
+
+/// What the API tells of a trip, as far as a story looks at it.
+fn fault(by_watchdog: bool, found: bool) -> Option<String> {
+    Some(serde_json::json!({ "fault": { "by_watchdog": by_watchdog, "found": found } }).to_string())
+}
+
+#[test]
+fn a_trip_by_the_watchdog_behind_a_cut_line_is_told_by_the_silence_and_never_by_the_mains() {
+    let folder = Folder::new("history-night-watchdog");
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    let on_wall = |steady_ms| Moment { steady_ms, wall_ms: NIGHT_MS + steady_ms };
+    let mut archive = Archive::begin(on_wall(0));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    let mut event = |at, drive: &str, what: &str, text: &str, body| {
+        let record = Record::of_history(on_wall(at), what, text);
+        let (drive, line) = (Some(drive.to_owned()), Some("north".to_owned()));
+        archive.record(Record { kind: Kind::Event, drive, line, body, ..record });
+    };
+    for drive in ["pump 1", "pump 2", "pump 3"] {
+        event(100_000, drive, "lost", "lost for 2.0 s: no answer", None);
+    }
+    for drive in ["pump 1", "pump 2", "pump 3"] {
+        event(123_000, drive, "tripped", "tripped, found so", fault(false, true));
+        let text = "trip explained, found so by its communication watchdog: 5 SLF: Modbus communication interruption";
+        event(123_200, drive, "trip_explained", text, fault(true, true));
+    }
+    archive.end_run(&mut store.connection, on_wall(200_000)).unwrap();
+    let story = tell(&store.connection, "pump 3", NIGHT_MS + 123_000).unwrap();
+    assert!(story.about.as_ref().unwrap().text.contains("5 SLF"), "{story:?}");
+    let (seen, likely) = (story.why(Certainty::Seen), story.why(Certainty::Likely));
     assert!(
-        story.not_known.last().unwrap().text.contains("100 % of the 20 minutes around are known"),
-        "{:?}",
-        story.not_known
+        seen.contains("it had not answered before")
+            && seen.contains("pump 1, pump 2 of its line fell silent with it"),
+        "{story:?}"
+    );
+    assert!(
+        likely.contains("the cable, its adapter, or the supply") && !likely.contains("mains"),
+        "{story:?}"
     );
 }

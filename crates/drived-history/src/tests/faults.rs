@@ -3,13 +3,14 @@
 use std::{fs, os::unix::fs::PermissionsExt as _, time::Duration};
 
 use drived_config::testing::Folder;
+use drived_plant::plant::past::RecordView;
 use rusqlite::Connection;
 use tokio::sync::watch;
 
 use super::{BEGIN_MS, Pump, event, moment};
 use crate::{
     quantity::Quantity,
-    read::{Filter, Found, History, records},
+    read::{Filter, History, records},
     record::Moment,
     store::{self, StoreError, schema},
     write::{
@@ -23,7 +24,7 @@ use crate::{
 
 const HZ: Quantity = Quantity::OUTPUT_FREQUENCY;
 
-fn all(connection: &Connection) -> Vec<Found> {
+fn all(connection: &Connection) -> Vec<RecordView> {
     let filter = Filter { from_ms: 0, to_ms: i64::MAX, limit: 1_000_000, ..Filter::default() };
     records(connection, &filter).unwrap()
 }
@@ -176,7 +177,7 @@ fn a_clock_that_is_set_back_makes_two_tellings_of_one_time_in_the_order_of_the_d
     let told = all(&store.connection);
     let steady: Vec<i64> = told.iter().map(|found| found.steady_ms).collect();
     assert!(steady.is_sorted(), "{steady:?}");
-    let stepped: Vec<&Found> = told.iter().filter(|found| found.what == "clock_stepped").collect();
+    let stepped: Vec<&RecordView> = told.iter().filter(|found| found.what == "clock_stepped").collect();
     assert_eq!(stepped.len(), 1);
     assert!(stepped[0].text.starts_with("the clock was set back by 3600.0 s"), "{}", stepped[0].text);
     let pieces = crate::read::pieces(&store.connection, "pump", HZ, 0, i64::MAX).unwrap();

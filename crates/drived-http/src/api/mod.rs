@@ -9,6 +9,7 @@ pub mod demo;
 mod document;
 mod health;
 mod parameter;
+mod past;
 mod problem;
 mod read;
 mod reload;

@@ -13,7 +13,7 @@ use super::{
     alarms::{self, Acknowledge, Shelve, Unshelve},
     capture, command, demo, health,
     parameter::{self, NewValue},
-    read, reload,
+    past, read, reload,
     selected::Selected,
     stream,
 };
@@ -26,6 +26,7 @@ use drived_plant::plant::{
     commands::{NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
     history::{CurvesView, HistoryView},
     parameters::{ParameterView, WrittenView},
+    past::{RecordsView, StoryView, ValuesView},
     recent::RecentView,
     views::{CommandView, DriveView, LineDetailView, LineView, SettingsView, StateView},
 };
@@ -251,9 +252,49 @@ pub(super) fn reload_routes() -> Vec<Route> {
     vec![route]
 }
 
+/// What was, where a history is kept.
+fn pasts() -> Vec<Route> {
+    let from = Parameter { name: "from_unix_ms", about: "from when", kind: "integer" };
+    let to = Parameter { name: "to_unix_ms", about: "until when, itself included", kind: "integer" };
+    let with_time = |route: Route| route.with_query(from).with_query(to).or_problem(404).or_problem(503);
+    let parameter = |name, about, kind| Parameter { name, about, kind };
+    vec![
+        with_time(
+            Route::get("/api/v1/drives/{name}/past", past::values, "A value of a drive between two moments")
+                .with_query(parameter("value", "which, such as output_frequency_hz", "string"))
+                .with_query(parameter(
+                    "every_ms",
+                    "in steps of this length; as it was read unless it is said",
+                    "integer",
+                ))
+                .answers::<ValuesView>(
+                    200,
+                    "what is known, with its gaps; next_from_unix_ms says where to ask on",
+                ),
+        ),
+        Route::get("/api/v1/drives/{name}/why", past::why, "What happened to a drive at a moment, in words")
+            .with_query(parameter("at_unix_ms", "when, to the minute", "integer"))
+            .answers::<StoryView>(200, "what came first, what followed, who did what, and what is not known")
+            .or_problem(503),
+        with_time(
+            Route::get("/api/v1/history/records", past::records, "What happened between two moments")
+                .with_query(parameter("drive", "of one drive, and what is of none alone", "string"))
+                .with_query(parameter("kind", "event, command, alarm, notice or history", "string"))
+                .with_query(parameter(
+                    "after",
+                    "only what stands behind the record of this number",
+                    "integer",
+                ))
+                .with_query(parameter("limit", "so many at the most, 20000", "integer"))
+                .answers::<RecordsView>(200, "in the daemon's own order; next_after says where to ask on"),
+        ),
+    ]
+}
+
 /// All of them.
 pub(super) fn routes() -> Vec<Route> {
     let mut routes = reads();
+    routes.extend(pasts());
     routes.extend(commands());
     routes
 }

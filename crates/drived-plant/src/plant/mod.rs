@@ -5,6 +5,7 @@ pub mod commands;
 pub mod history;
 mod last;
 pub mod parameters;
+pub mod past;
 mod progress;
 pub mod recent;
 pub mod revisions;
@@ -77,6 +78,7 @@ struct Inner {
     usage: Usage,
     alarms: alarms::Desk,
     names: OnceLock<Names>,
+    past: RwLock<Option<Arc<dyn past::Past>>>,
 }
 
 impl Plant {
@@ -106,6 +108,7 @@ impl Plant {
             usage: Usage::default(),
             alarms: alarms::Desk::new(kept),
             names: OnceLock::new(),
+            past: RwLock::default(),
         });
         watching::start(&inner);
         history::start(&inner);

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use chrono::{DateTime, Local};
 use drived_file::Config;
 use drived_history::{
+    column::Point,
     config::HistoryConfig,
-    curve::Piece,
     quantity::{Quantity, TABLE},
-    read::{self, Filter, Found, History, Told},
+    read::{self, Filter, History},
     store::StoreError,
 };
+use drived_plant::plant::past::{AT_ONCE, RecordView, StepView as Told};
 use drived_words::{
     duration::Time,
     failure::Failure,
@@ -95,6 +96,18 @@ pub(crate) fn failed(error: StoreError) -> Failure {
     Failure::Input(error.to_string())
 }
 
+/// Why points are read no further.
+enum Stopped {
+    By(Failure),
+    Unreadable(StoreError),
+}
+
+impl From<StoreError> for Stopped {
+    fn from(error: StoreError) -> Self {
+        Self::Unreadable(error)
+    }
+}
+
 /// A moment that somebody has said, in milliseconds since 1970; an hour that comes twice is told.
 pub(crate) fn moment_of(text: &str) -> Result<i64, Failure> {
     let said = moment::said(text, &Local::now()).map_err(|error| Failure::Input(error.to_string()))?;
@@ -127,8 +140,8 @@ const SHOWN: [Quantity; 5] =
     [Quantity::STATE, Quantity::OUTPUT_FREQUENCY, Quantity::SETPOINT, Quantity::CURRENT, Quantity::TORQUE];
 /// So many rows of values a person is shown at the most, unless the steps are said.
 const ROWS: i64 = 40;
-/// So many records are read at once.
-const AT_ONCE: usize = 1_000;
+/// So many steps at the most, whoever reads them.
+const STEPS: i64 = 1_000_000;
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let now = Local::now().timestamp_millis();
@@ -172,29 +185,38 @@ struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    fn pieces(&self, quantity: Quantity) -> Result<Vec<Piece>, Failure> {
-        read::pieces(&self.history.0, self.drive, quantity, self.from, self.to).map_err(failed)
+    fn each_point(
+        &self,
+        quantity: Quantity,
+        mut each: impl FnMut(Point) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let each = |point| each(point).map(|()| true).map_err(Stopped::By);
+        let read = read::points(&self.history.0, self.drive, quantity, self.from, self.to, each);
+        read.map_err(|stopped| match stopped {
+            Stopped::By(failure) => failure,
+            Stopped::Unreadable(error) => failed(error),
+        })
     }
 
     fn steps(&self, quantity: Quantity, length_ms: i64) -> Result<Vec<Told>, Failure> {
+        if (self.to - self.from) / length_ms > STEPS {
+            return Err(Failure::Input(format!(
+                "expected longer steps than {length_ms} ms: {STEPS} are told at the most"
+            )));
+        }
         read::steps(&self.history.0, self.drive, quantity, self.from, self.to, length_ms).map_err(failed)
     }
 
     /// Those that are meant, or all of which there is something.
     fn meant(&self, quantities: &[Quantity]) -> Result<Vec<Quantity>, Failure> {
-        if !quantities.is_empty() {
-            return Ok(quantities.to_vec());
+        match quantities.is_empty() {
+            true => read::all_quantities(&self.history.0, self.drive).map_err(failed),
+            false => Ok(quantities.to_vec()),
         }
-        let all = read::quantities(&self.history.0, self.drive, self.from, self.to).map_err(failed)?;
-        Ok(match all.is_empty() {
-            // What is kept in steps alone has its names nowhere else.
-            true => (0..u32::try_from(TABLE.len()).unwrap_or_default()).map(Quantity).collect(),
-            false => all.into_iter().collect(),
-        })
     }
 
     /// All that happened, some at a time.
-    fn each_record(&self, mut each: impl FnMut(&Found) -> Result<(), Failure>) -> Result<(), Failure> {
+    fn each_record(&self, mut each: impl FnMut(&RecordView) -> Result<(), Failure>) -> Result<(), Failure> {
         let mut after = 0;
         loop {
             let filter = Filter {
@@ -221,18 +243,10 @@ impl Asked<'_> {
         }
         for quantity in self.meant(quantities)? {
             match every {
-                None => {
-                    for piece in self.pieces(quantity)? {
-                        for point in piece.closed() {
-                            let is = point.count.map(|count| quantity.text(count)).unwrap_or_default();
-                            output::say_as_it_is(format_args!(
-                                "{},{},{quantity},{is}",
-                                whole(point.at),
-                                point.at
-                            ))?;
-                        }
-                    }
-                }
+                None => self.each_point(quantity, |point| {
+                    let is = point.count.map(|count| quantity.text(count)).unwrap_or_default();
+                    output::say_as_it_is(format_args!("{},{},{quantity},{is}", whole(point.at), point.at))
+                })?,
                 Some(every) => {
                     for step in self.steps(quantity, length(every))? {
                         let Told { start_unix_ms, least, mean, greatest, known } = step;
@@ -251,15 +265,10 @@ impl Asked<'_> {
         for quantity in self.meant(quantities)? {
             let name = quantity.to_string();
             match every {
-                None => {
-                    for point in self.pieces(quantity)?.into_iter().flat_map(Piece::closed) {
-                        let is = point.count.map(|count| match quantity.is_number() {
-                            true => json!(quantity.value(count as f64)),
-                            false => json!(quantity.text(count)),
-                        });
-                        output::say_as_it_is(json!({ "time_unix_ms": point.at, "value": name, "is": is }))?;
-                    }
-                }
+                None => self.each_point(quantity, |point| {
+                    let point = quantity.point(point);
+                    output::say_as_it_is(json!({ "value": name, "point": point }))
+                })?,
                 Some(every) => {
                     for step in self.steps(quantity, length(every))? {
                         output::say_as_it_is(json!({ "value": name, "step": step }))?;

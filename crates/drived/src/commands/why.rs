@@ -1,6 +1,7 @@
 //! `drived why`: the story of a moment in words.
 
-use drived_history::story::{self, Certainty, Sentence, Story};
+use drived_history::story;
+use drived_plant::plant::past::{Certainty, SentenceView as Sentence, StoryView as Story};
 use drived_words::{
     failure::Failure,
     output::{self, JsonArgs},

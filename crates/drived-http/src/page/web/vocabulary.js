@@ -138,6 +138,7 @@ const WORDS = {
   reload: ['Reload', 'Rechargement'],
   clock_stepped: ['Clock stepped', 'Horloge recalée'],
   audit_log: ['Audit log', 'Journal d’audit'],
+  history: ['History', 'Historique'],
 };
 
 /** The plain word for a word of the API; words that are not in the table stand for themselves. */

@@ -1,0 +1,106 @@
+//! What was: values, events and stories of the history, where one is kept.
+
+use std::sync::Arc;
+
+use axum::{
+    extract::{Query, State, rejection::QueryRejection},
+    http::StatusCode,
+    response::Response,
+};
+use serde::{Deserialize, Serialize};
+use tokio::{sync::Semaphore, task::spawn_blocking};
+
+use super::{
+    ask::{Named, Viewer},
+    problem::Problem,
+    read::fresh,
+};
+use drived_plant::plant::{
+    Plant,
+    past::{Past, PastError, RecordsAsked, ValuesAsked},
+};
+
+/// So many read the disk at once: more would hold up the others, and the machine.
+static AT_ONCE: Semaphore = Semaphore::const_new(2);
+
+/// Which values.
+#[derive(Deserialize)]
+pub(super) struct Values {
+    value: String,
+    from_unix_ms: i64,
+    to_unix_ms: i64,
+    every_ms: Option<i64>,
+}
+
+/// Which records.
+#[derive(Deserialize)]
+pub(super) struct Records {
+    from_unix_ms: i64,
+    to_unix_ms: i64,
+    drive: Option<String>,
+    kind: Option<String>,
+    after: Option<i64>,
+    limit: Option<usize>,
+}
+
+/// Which moment.
+#[derive(Deserialize)]
+pub(super) struct At {
+    at_unix_ms: i64,
+}
+
+pub(super) async fn values(
+    State(plant): State<Plant>,
+    _: Viewer,
+    Named(drive): Named,
+    query: Result<Query<Values>, QueryRejection>,
+) -> Result<Response, Problem> {
+    let Query(Values { value, from_unix_ms, to_unix_ms, every_ms }) = query?;
+    if every_ms.is_some_and(|every| every < 1) {
+        return Err(Problem::new(StatusCode::BAD_REQUEST, "every_ms: expected 1 or more"));
+    }
+    let asked = ValuesAsked { drive, value, from_unix_ms, to_unix_ms, every_ms };
+    told(&plant, move |past| past.values(&asked)).await
+}
+
+pub(super) async fn records(
+    State(plant): State<Plant>,
+    _: Viewer,
+    query: Result<Query<Records>, QueryRejection>,
+) -> Result<Response, Problem> {
+    let Query(Records { from_unix_ms, to_unix_ms, drive, kind, after, limit }) = query?;
+    let after = after.unwrap_or_default();
+    let asked = RecordsAsked { from_unix_ms, to_unix_ms, drive, kind, after, limit };
+    told(&plant, move |past| past.records(&asked)).await
+}
+
+pub(super) async fn why(
+    State(plant): State<Plant>,
+    _: Viewer,
+    Named(drive): Named,
+    query: Result<Query<At>, QueryRejection>,
+) -> Result<Response, Problem> {
+    let Query(At { at_unix_ms }) = query?;
+    told(&plant, move |past| past.story(&drive, at_unix_ms)).await
+}
+
+/// Asks whoever keeps the past, on a thread that may wait for a disk.
+async fn told<T: Serialize + Send + 'static>(
+    plant: &Plant,
+    ask: impl FnOnce(&dyn Past) -> Result<T, PastError> + Send + 'static,
+) -> Result<Response, Problem> {
+    let past: Arc<dyn Past> =
+        plant.past().ok_or_else(|| Problem::not_found("no history is kept by this program"))?;
+    let unreadable = |why: String| Problem::new(StatusCode::SERVICE_UNAVAILABLE, why);
+    let place = AT_ONCE.acquire().await.map_err(|error| unreadable(error.to_string()))?;
+    let answer = spawn_blocking(move || {
+        // It is given up when it has been read, also where nobody waits for the answer any more.
+        let _place = place;
+        ask(&*past)
+    });
+    match answer.await.map_err(|error| unreadable(error.to_string()))? {
+        Ok(view) => Ok(fresh(&view)),
+        Err(error @ PastError::Asked(_)) => Err(Problem::new(StatusCode::BAD_REQUEST, error.to_string())),
+        Err(error) => Err(unreadable(error.to_string())),
+    }
+}
