@@ -1,18 +1,13 @@
 //! What is asked to be done with alarms: taken by the same desk as commands, and for as long.
 
-use serde::Serialize;
-use serde_json::Value;
 use tokio::time::Instant;
 
-use super::{Answers, Desk, Refusal, counter::Order, judge_time};
+use super::{Answers, Desk, Refusal, alarms_answer::AlarmsOrder, counter::Order, judge_time};
 use drived_doors::{
     Caller,
     audit::{Kind, Record},
 };
-use drived_plant::plant::{
-    alarms::{AlarmsAsked, AlarmsSaid},
-    commands::{LIFETIME, OutcomeWord},
-};
+use drived_plant::plant::{alarms::AlarmsSaid, commands::LIFETIME};
 
 /// A message about alarms, as a broker's face has it.
 pub struct AlarmMessage<A> {
@@ -28,30 +23,6 @@ pub struct AlarmMessage<A> {
     /// For the audit log.
     pub what: String,
     pub answers: A,
-}
-
-/// What is asked, and by what it is known.
-#[derive(Debug, Clone)]
-pub(super) struct AlarmsOrder {
-    pub(super) id: Option<String>,
-    pub(super) asked: AlarmsAsked,
-}
-
-/// What was done with alarms, as it is told. It is `confirmed` where something was done with each of them.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct AlarmsAnswer {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub id: Option<String>,
-    pub outcome: OutcomeWord,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reason: Option<&'static str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub text: Option<String>,
-    /// What became of each.
-    pub alarms: Vec<Value>,
-    pub caller: String,
-    pub origin: String,
-    pub time_unix_ms: u64,
 }
 
 impl<A: Answers + Sync> Desk<A> {

@@ -10,7 +10,7 @@ use tokio::{
 
 use super::{
     Answer, Answers, Refusal, Refused,
-    alarms::{AlarmsAnswer, AlarmsOrder},
+    alarms_answer::{AlarmsAnswer, AlarmsOrder},
 };
 use drived_doors::{
     Caller,

@@ -5,6 +5,7 @@
 //! stands in the audit log, except that a stop waits for nothing.
 
 mod alarms;
+mod alarms_answer;
 mod counter;
 mod pace;
 mod refusal;
@@ -21,7 +22,8 @@ use tokio::{
 };
 
 pub use self::{
-    alarms::{AlarmMessage, AlarmsAnswer},
+    alarms::AlarmMessage,
+    alarms_answer::AlarmsAnswer,
     refusal::{Refusal, Refused},
 };
 use self::{

@@ -11,6 +11,7 @@ use tokio::{sync::watch, time::Instant};
 
 use super::{
     Face,
+    last::ACCEPTED,
     topics::{Meant, Verb},
 };
 use crate::{
@@ -244,7 +245,7 @@ impl Answers for To {
             Answer::Command(view) => {
                 let mut said = json!(view);
                 if view.outcome == OutcomeWord::Pending {
-                    said["outcome"] = "accepted".into();
+                    said["outcome"] = ACCEPTED.into();
                 }
                 said
             }

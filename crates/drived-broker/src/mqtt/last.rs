@@ -6,8 +6,11 @@ use serde_json::json;
 use tokio::{sync::watch, time::Instant};
 
 use super::Face;
-use drived_plant::plant::LastCommandView;
+use drived_plant::plant::{LastCommandView, commands::OutcomeWord};
 use drived_words::json::unix;
+
+/// What is not known yet, as it is told to who has asked, too.
+pub(super) const ACCEPTED: &str = "accepted";
 
 /// What tells it.
 pub(super) struct LastCommands {
@@ -42,6 +45,9 @@ impl LastCommands {
         for (drive, last) in &commands {
             if again || self.told.get(drive) != Some(last) {
                 let mut told = json!(last);
+                if last.outcome == OutcomeWord::Pending {
+                    told["outcome"] = ACCEPTED.into();
+                }
                 told["time_unix_ms"] = unix(now).into();
                 face.tell(face.topics.drive(drive, "last_command"), told.to_string());
             }

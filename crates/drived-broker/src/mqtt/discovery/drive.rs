@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use super::{
     super::{
         Face,
+        last::ACCEPTED,
         topics::{Meant, Verb},
     },
     Component, Device, alarms, button, component, expire_after,
@@ -36,17 +37,10 @@ const STATES: [State; 9] = [
     State::Unknown,
 ];
 
-/// Everything that a command can become.
-const OUTCOMES: [OutcomeWord; 8] = [
-    OutcomeWord::Pending,
-    OutcomeWord::Confirmed,
-    OutcomeWord::NotConfirmed,
-    OutcomeWord::Unknown,
-    OutcomeWord::Refused,
-    OutcomeWord::Expired,
-    OutcomeWord::Superseded,
-    OutcomeWord::Nothing,
-];
+/// Everything that a command can become. That this is not known has a word of its own: `unknown` is Home Assistant's for no value.
+const OUTCOMES: [&str; 8] =
+    [ACCEPTED, "confirmed", "not_confirmed", OUTCOME_UNKNOWN, "refused", "expired", "superseded", "nothing"];
+const OUTCOME_UNKNOWN: &str = "outcome_unknown";
 
 /// The device of a drive.
 pub(super) fn device(face: &Face, drive: &DriveHandle) -> Device {
@@ -90,7 +84,7 @@ fn shown(face: &Face, topic: impl Fn(&str) -> String) -> [Component; 6] {
             "sensor",
             json!({
                 "name": "Fault", "state_topic": topic("fault"), "json_attributes_topic": topic("fault"),
-                "value_template": "{{ (value_json.mnemonic | default(value_json.code)) if value_json.present else \
+                "value_template": "{{ (value_json.mnemonic | default(value_json.code | default(none))) if value_json.present else \
                                    ('none' if value_json.quality == 'good' else none) }}",
                 "expire_after": expire_after,
             }),
@@ -131,7 +125,10 @@ fn shown(face: &Face, topic: impl Fn(&str) -> String) -> [Component; 6] {
             "sensor",
             json!({
                 "name": "Last command", "device_class": "enum", "options": OUTCOMES,
-                "state_topic": topic("last_command"), "value_template": "{{ value_json.outcome }}",
+                "state_topic": topic("last_command"), "value_template": format!(
+                    "{{{{ '{OUTCOME_UNKNOWN}' if value_json.outcome == '{}' else value_json.outcome }}}}",
+                    OutcomeWord::Unknown
+                ),
                 "json_attributes_topic": topic("last_command"),
                 "availability": always, "availability_mode": "all",
             }),
@@ -186,4 +183,18 @@ fn controls(face: &Face, drive: &DriveHandle, id: &str) -> [Component; 5] {
             when(may_operate, moving(button("Reset fault", topic(Verb::Reset), "reset"))),
         ),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_outcome_has_its_option() {
+        use OutcomeWord::{Confirmed, Expired, NotConfirmed, Nothing, Pending, Refused, Superseded, Unknown};
+        let all = [Pending, Confirmed, NotConfirmed, Unknown, Refused, Expired, Superseded, Nothing];
+        let words =
+            all.map(|word| word.to_string().replace("unknown", OUTCOME_UNKNOWN).replace("pending", ACCEPTED));
+        assert_eq!(words, OUTCOMES);
+    }
 }
