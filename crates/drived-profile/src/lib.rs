@@ -28,7 +28,8 @@ pub enum Command {
     Show(show::Args),
     Check(check::Args),
     New(new::Args),
-    Try(trial::Args),
+    // It says more than all others together.
+    Try(Box<trial::Args>),
 }
 
 pub async fn run(command: Command) -> Result<(), Failure> {
@@ -37,6 +38,6 @@ pub async fn run(command: Command) -> Result<(), Failure> {
         Command::Show(args) => show::run(&args),
         Command::Check(args) => check::run(&args),
         Command::New(args) => new::run(&args),
-        Command::Try(args) => trial::run(args).await,
+        Command::Try(args) => trial::run(*args).await,
     }
 }

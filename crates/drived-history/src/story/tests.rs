@@ -58,6 +58,7 @@ impl Night {
         let drives = match target {
             Target::All => self.plant.plant.drives().iter().map(|drive| drive.name().to_string()).collect(),
             Target::Drive(name) => vec![name],
+            Target::Selected(names) => names,
             Target::Group(_) => Vec::new(),
         };
         for drive in drives {

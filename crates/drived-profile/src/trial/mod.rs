@@ -69,7 +69,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         seen: Vec::new(),
     };
     // By what it is, and by what it is once it was tried: only the last step needs more.
-    let (_, tried) = protocol.into_file(&text).map_err(Failure::Input)?;
+    let (_, tried) = protocol.written_into(&text).map_err(Failure::Input)?;
     let name = DriveName { family: family(tried), slave };
     let options = args.options.of(&[name])?;
     let config = args.line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
@@ -79,7 +79,7 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let climbed = steps.climb(&mut console, &mut protocol.seen).await;
     close(&line).await;
     climbed?;
-    let (with, profile) = protocol.into_file(&text).map_err(Failure::Input)?;
+    let (with, profile) = protocol.written_into(&text).map_err(Failure::Input)?;
     output::say(format_args!("{}: it reaches {} now", profile.key(), profile.level()))?;
     match file {
         Some(file) => {

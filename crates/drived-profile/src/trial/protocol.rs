@@ -31,7 +31,7 @@ impl Protocol {
     ///
     /// # Errors
     /// What keeps it from being written, for whoever writes the file.
-    pub(crate) fn into_file(&self, text: &str) -> Result<(String, Profile), String> {
+    pub(crate) fn written_into(&self, text: &str) -> Result<(String, Profile), String> {
         let is_empty_answer = |line: &&str| {
             let answer = line.split_once('=').filter(|(key, _)| key.trim() == "tried");
             answer.is_some_and(|(_, said)| matches!(said.trim(), "\"none\"" | "\"unknown\"" | "[]"))
@@ -73,9 +73,9 @@ mod tests {
         let (_, text) =
             shipped::TEXTS.iter().find(|(name, _)| *name == "delta/ms300").expect("it is shipped");
         assert_eq!(read(text).expect("it is right").level(), Level::Stop);
-        let (once, profile) = protocol().into_file(text).expect("it goes in");
+        let (once, profile) = protocol().written_into(text).expect("it goes in");
         assert_eq!(profile.level(), Level::Motion, "{:#?}", profile.gaps());
-        let (twice, profile) = protocol().into_file(&once).expect("it goes in again");
+        let (twice, profile) = protocol().written_into(&once).expect("it goes in again");
         let tried = profile.file().tried.given().expect("it was tried");
         assert_eq!(tried.len(), 2);
         assert_eq!(tried[1].get_ref().drive, "MS300, 0.75 kW \"on the bench\"");

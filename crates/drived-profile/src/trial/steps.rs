@@ -61,7 +61,7 @@ impl Steps {
             }
             match drive.read_parameter(row).await {
                 Ok(word) => {
-                    console.say(format_args!("  {} = {} ({})", row.code, row.show(word), row.name))?
+                    console.say(format_args!("  {} = {} ({})", row.code, row.show(word), row.name))?;
                 }
                 Err(error) => {
                     refused += 1;
