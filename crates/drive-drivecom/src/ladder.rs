@@ -182,6 +182,7 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
                         climb.forget_written();
                         true
                     }
+                    Err(error) if leaves_open(&error) => return Err(error.after_write()),
                     Err(error) if exception(&error) != Some(ACKNOWLEDGED) => return Err(error),
                     _ => {
                         confirming = Confirming::begin();
@@ -219,10 +220,7 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
 fn keep_lease(own: &mut OwnRun, written: &Result<()>) {
     match written {
         Ok(()) => own.was_written(),
-        Err(error) if exception(error) == Some(ACKNOWLEDGED) => {}
-        Err(error) if matches!(error.kind(), ErrorKind::Exception | ErrorKind::NotSent) => {
-            own.was_not_written();
-        }
+        Err(error) if is_denied(error) || error.kind() == ErrorKind::NotSent => own.was_not_written(),
         Err(_) => {}
     }
 }
@@ -375,6 +373,7 @@ pub async fn reset_fault<D: Drivecom>(drive: &mut D) -> Result<Status> {
     if let Err(error) = edge
         && error.kind() != ErrorKind::OutcomeUnknown
         && exception(&error) != Some(ACKNOWLEDGED)
+        && !leaves_open(&error)
     {
         return Err(error);
     }
@@ -404,6 +403,17 @@ const fn tripped(status: &Status) -> Refusal {
         Some(code) if code != 0 => Refusal::Fault(code),
         _ => Refusal::Tripped,
     }
+}
+
+/// Whether an exception says that nothing was done by a write: function, address or value are not the drive's, or it was busy.
+fn is_denied(error: &Error) -> bool {
+    exception(error).is_some_and(|code| matches!(code, 0x01..=0x03 | BUSY))
+}
+
+/// Whether an exception leaves open what a write has done: 04h is printed as "started but cannot complete", and a gateway's 0Bh says
+/// only that it has heard no answer.
+fn leaves_open(error: &Error) -> bool {
+    exception(error).is_some_and(|code| code != ACKNOWLEDGED) && !is_denied(error)
 }
 
 const fn exception(error: &Error) -> Option<u8> {
