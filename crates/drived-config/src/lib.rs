@@ -1,6 +1,6 @@
 //! What holds at `drived` before a drive is spoken to: what a configuration is made of ([`config`]), who may do what
-//! ([`rights`]), the drives that come from files ([`profiles`]), and what is kept in files ([`kept`]), such as the records of each drive ([`records`]) and its number
-//! ([`names`]).
+//! ([`rights`]), the drives that come from files ([`profiles`]), the name of the host ([`host`]), and what is kept in files ([`kept`]), such
+//! as the records of each drive ([`records`]) and its number ([`names`]).
 
 #![forbid(unsafe_code)]
 #![allow(
@@ -11,6 +11,7 @@
 )]
 
 pub mod config;
+pub mod host;
 pub mod kept;
 pub mod names;
 pub mod profiles;

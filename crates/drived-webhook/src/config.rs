@@ -7,7 +7,10 @@ use std::{
 };
 
 use drive_fleet::Severity;
-use drived_config::config::{ConfigError, Entry as _, Parsed, Source, of, settings, within, words};
+use drived_config::{
+    config::{ConfigError, Entry as _, Parsed, Source, of, settings, within, words},
+    host::host_name,
+};
 use drived_words::duration::Time;
 use toml::Spanned;
 
@@ -154,17 +157,11 @@ impl WebhookEntry {
             authorization: beside(&self.authorization),
             secret: beside(&self.secret),
             wanted: Wanted { severity: Severity::Warning, only_coming: false, settle: 2 * SECOND },
-            form: Form { host: own_name(), text, body: Body::Alarm },
+            form: Form { host: host_name().unwrap_or_default(), text, body: Body::Alarm },
             within: 10 * SECOND,
             pause: SECOND,
         };
         self.set(source, &mut webhook)?;
         Ok(webhook)
     }
-}
-
-/// The name of this machine, without its domain.
-fn own_name() -> String {
-    let name = rustix::system::uname().nodename().to_string_lossy().into_owned();
-    name.split('.').next().unwrap_or_default().to_owned()
 }

@@ -28,9 +28,12 @@ use self::{
 };
 use crate::broker::{
     Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Wanted, Will,
-    config::{Address, Discovery, MqttConfig, host_name},
+    config::{Address, Discovery, MqttConfig},
 };
-use drived_config::names::{Kind, Names};
+use drived_config::{
+    host::host_name,
+    names::{Kind, Names},
+};
 use drived_doors::{audit::Audit, secret};
 use drived_plant::{
     counts::{Id, Samples},

@@ -5,5 +5,5 @@ mod sparkplug;
 
 pub use self::{
     mqtt::{Address, Discovery, MqttConfig, MqttEntry},
-    sparkplug::{SparkplugConfig, host_name},
+    sparkplug::SparkplugConfig,
 };

@@ -8,6 +8,7 @@ use toml::Spanned;
 
 use drived_config::{
     config::{ConfigError, Parsed, Source, State, words},
+    host::host_name,
     rights::Role,
 };
 use drived_plant::plant::commands::LONGEST_LIFETIME;
@@ -115,10 +116,4 @@ fn alike<'a>(names: &[&'a str]) -> Option<(&'a str, &'a str)> {
     let mut lower: Vec<(String, &str)> = names.iter().map(|name| (name.to_lowercase(), *name)).collect();
     lower.sort_unstable();
     lower.windows(2).find(|pair| pair[0].0 == pair[1].0).map(|pair| (pair[0].1, pair[1].1))
-}
-
-/// The name of this machine, without its domain; `None` where the system keeps none in a file.
-pub fn host_name() -> Option<String> {
-    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok()?;
-    name.trim().split('.').next().filter(|name| !name.is_empty()).map(str::to_owned)
 }
