@@ -90,7 +90,7 @@ impl<P: Port> Drive3g3ev<P> {
         // In percent too: what counts is whether it is 0.
         let output = counts.map(|counts| Frequency::from_centihertz(counts.into()));
         let shown = output.map_or(Output::NotKnown, |output| self.output(status, output));
-        status.motion = self.watch.shaft.see(now, shown, output);
+        status.motion = self.watch.see(now, shown, output);
         status.verdict = self.verdict(status);
     }
 

@@ -179,9 +179,9 @@ pub(crate) fn withheld(word: StatusWord) -> Option<Refusal> {
 impl<P: Port> Atv21<P> {
     /// What a reading of the fast set says of the shaft and of the run command.
     pub(crate) fn tell(&mut self, status: &mut Status) {
-        let shaft = &mut self.watch.shaft;
-        let shown = output(status_word(status), status.output_frequency, shaft.was_braked());
-        status.motion = shaft.see(Instant::now(), shown, status.output_frequency);
+        let was_braked = self.watch.shaft.was_braked();
+        let shown = output(status_word(status), status.output_frequency, was_braked);
+        status.motion = self.watch.see(Instant::now(), shown, status.output_frequency);
         status.verdict = self.verdict(status);
     }
 

@@ -203,6 +203,13 @@ impl Shaft {
         self.was_lost = true;
     }
 
+    /// A motor that was seen at rest may have turned since: without an output that was seen to come down, it may coast.
+    pub(crate) fn may_turn(&mut self) {
+        if self.past == Past::AtRest {
+            self.past = Past::Stopped;
+        }
+    }
+
     /// A stop goes out. What a motor did that was never seen before nobody knows: without an output behind it, it may coast.
     pub fn stops(&mut self) {
         if self.past == Past::Unseen {

@@ -2,11 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use tokio::time::Instant;
+
 use crate::{
     lease::{Ground, Lease},
-    motion::Shaft,
+    motion::{Motion, Output, Shaft},
     own_run::OwnRun,
     turns::Turns,
+    units::Frequency,
 };
 
 /// The run command of this side, the shaft, and what a contract rests on: looked at with every status, and what no ordinary
@@ -25,6 +28,7 @@ pub struct Watch {
     /// What was found otherwise, and not told yet.
     changed: Vec<Ground>,
     armed: bool,
+    was_tripped: bool,
 }
 
 impl Watch {
@@ -38,6 +42,18 @@ impl Watch {
     #[must_use]
     pub const fn is_kept(&self) -> bool {
         self.run.lease().is_some() || self.armed
+    }
+
+    /// What the shaft does, by what a look at the drive shows: see [`Shaft::see`].
+    ///
+    /// A motor that was last seen at rest, holds a run command of this side and has tripped by this look may have turned between the
+    /// two: it is not told at rest.
+    pub fn see(&mut self, at: Instant, shown: Output, frequency: Option<Frequency>) -> Motion {
+        if self.run.lease().is_some() && shown == Output::Tripped && !self.was_tripped {
+            self.shaft.may_turn();
+        }
+        self.was_tripped = shown == Output::Tripped;
+        self.shaft.see(at, shown, frequency)
     }
 
     /// Whether this side has armed the drive's communication watchdog.
@@ -119,14 +135,10 @@ macro_rules! watched_by {
 
 #[cfg(test)]
 mod tests {
-    use tokio::time::Instant;
+    use std::time::Duration;
 
     use super::*;
-    use crate::{
-        motion::{Motion, Output},
-        setpoint::Direction,
-        units::Frequency,
-    };
+    use crate::setpoint::Direction;
 
     #[test]
     fn a_ground_is_told_once_when_it_is_found_otherwise_and_only_while_anything_rests_on_it() {
@@ -151,6 +163,28 @@ mod tests {
         watch.lose_sight();
         assert!(watch.is_kept() && watch.run.held().is_none());
         assert!(!watch.finds(7, 31, Ground::Limits));
+    }
+
+    /// A run command was given to a motor at rest; at the next look the drive has tripped, with the shaft at whatever speed it had
+    /// reached.
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_was_given_a_run_command_and_has_tripped_by_the_next_look_may_coast() {
+        let (now, zero) = (Instant::now(), Some(Frequency::ZERO));
+        let mut watch = Watch::default();
+        assert_eq!(watch.see(now, Output::None, zero), Motion::AtRest);
+        assert_eq!(
+            watch.see(now, Output::Tripped, zero),
+            Motion::AtRest,
+            "nobody has given it a run command"
+        );
+        assert_eq!(watch.see(now, Output::None, zero), Motion::AtRest);
+        watch.run.give(Lease::new(Direction::Forward, 1));
+        assert_eq!(watch.see(now, Output::None, zero), Motion::AtRest);
+        assert_eq!(watch.see(now, Output::Tripped, zero), Motion::Coasting);
+        // It goes on to be tripped: its owner's coast time runs from the first look.
+        watch.shaft.set_coast_time(Some(Duration::from_secs(9)));
+        assert_eq!(watch.see(now + Duration::from_secs(9), Output::Tripped, zero), Motion::AtRest);
+        assert_eq!(watch.see(now + Duration::from_secs(10), Output::Tripped, zero), Motion::AtRest);
     }
 
     /// It was being brought down, the line was lost, and at the next look there is no output: by the ramp, or cut.

@@ -243,7 +243,7 @@ impl<L: Copy + PartialEq> Proof<L> {
 
     /// What the shaft does, by what a status shows of the output.
     pub fn see(&mut self, at: Option<Instant>, shown: Output, frequency: Option<Frequency>) {
-        self.motion = self.watch.shaft.see(at.unwrap_or_else(Instant::now), shown, frequency);
+        self.motion = self.watch.see(at.unwrap_or_else(Instant::now), shown, frequency);
     }
 }
 

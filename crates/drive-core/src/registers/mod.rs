@@ -203,10 +203,12 @@ mod tests {
 
     #[test]
     fn a_row_is_found_by_mnemonic_decimal_or_hexadecimal_address() {
-        for text in ["rFr", "3202", "W3202", "0C82h"] {
+        for text in ["rFr", "RFR", "3202", "W3202", "0C82h", "0x0C82"] {
             assert_eq!(Row::find(ROWS, text), Some(RFR.row()), "{text}");
         }
-        assert_eq!(Row::find(ROWS, "RFR"), None);
+        for text in ["rF", "3203", "0xrFr", ""] {
+            assert_eq!(Row::find(ROWS, text), None, "{text}");
+        }
     }
 
     #[test]

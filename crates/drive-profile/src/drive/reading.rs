@@ -64,7 +64,7 @@ impl<P: Port> ProfileDrive<P> {
         let words = self.read_blocks(class, &blocks).await?;
         let mut status = self.explain(&words);
         let shown = self.shown(&status);
-        status.motion = self.watch.shaft.see(Instant::now(), shown, status.output_frequency);
+        status.motion = self.watch.see(Instant::now(), shown, status.output_frequency);
         let evidence = self.evidence(&status, &words);
         status.verdict = self.watch.run.verdict(&evidence);
         Ok((status, words))
