@@ -10,4 +10,3 @@ pub mod fuzz;
 pub mod matrix;
 pub mod model;
 pub mod report;
-pub mod story;

@@ -8,7 +8,12 @@ use std::{
 };
 
 use clap::{Parser, Subcommand};
-use drive_fire::{differential, fuzz, matrix, model, report::Told, story};
+use drive_fire::{
+    differential, fuzz,
+    matrix::{self, story},
+    model,
+    report::Told,
+};
 
 /// Attacks everything that stands, and says what was tried and what was found.
 #[derive(Debug, Parser)]

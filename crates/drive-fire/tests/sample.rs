@@ -2,7 +2,12 @@
 
 use std::time::Duration;
 
-use drive_fire::{fuzz, matrix, model, report::Told, story};
+use drive_fire::{
+    fuzz,
+    matrix::{self, story},
+    model,
+    report::Told,
+};
 
 fn finds_nothing(told: &Told, least: u64) {
     println!("{told}");

@@ -7,12 +7,11 @@ use drive_sim::Breach;
 use drive_testing::{contract::Open, truth::TOLERANCE};
 use tokio::time::{Instant, sleep, timeout};
 
-use crate::story::Story;
-
 use super::{
     Cell, Event, FarEnd, Fault, Operation, Subject, Way,
     axes::parameter,
     stage::{Around, Stage},
+    story::Story,
     telling,
 };
 

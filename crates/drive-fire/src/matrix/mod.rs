@@ -12,6 +12,7 @@ mod judge;
 mod live;
 mod plants;
 mod stage;
+pub mod story;
 mod tap;
 mod telling;
 

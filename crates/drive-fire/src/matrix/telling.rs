@@ -10,8 +10,8 @@ use super::{
     Fault, Operation,
     live::{Asks, Lived, PATIENCE, SETPOINT, operate, poll_for},
     stage::{Around, Site, Stage},
+    story::{Step, Story},
 };
-use crate::story::{Step, Story};
 
 /// What was done so far.
 #[derive(Debug, Default)]

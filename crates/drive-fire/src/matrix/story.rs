@@ -5,10 +5,8 @@ use std::{fmt, time::Instant};
 
 use fastrand::Rng;
 
-use crate::{
-    matrix::{Event, FarEnd, Fault, Lived, Operation, Subject, Way, tell},
-    report::{Find, Told},
-};
+use super::{Event, FarEnd, Fault, Lived, Operation, Subject, Way, tell};
+use crate::report::{Find, Told};
 
 /// What happens next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
