@@ -11,7 +11,7 @@ const SHOWS: &[&str] = &[
     "drive-fleet/src/shows.rs",
     "drive-fleet/src/view.rs",
     "drived-line-tools/src/poll/json.rs",
-    "drived-broker/src/mqtt/discovery.rs",
+    "drived-broker/src/mqtt/discovery/drive.rs",
     "drived-gateway/src/virtual_unit.rs",
     "drived-http/src/metrics/drives.rs",
     "drived-plant/src/journal/words.rs",

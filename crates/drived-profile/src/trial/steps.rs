@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use drive_bus::{Line, LineConfig};
-use drive_core::{Direction, Drive, Frequency, State, Status, StopMode};
+use drive_core::{Direction, Drive, Frequency, Motion, Status, StopMode};
 use drive_families::Options;
 use drive_fleet::{Order, Until};
 use tokio::time::{Instant, sleep};
@@ -86,12 +86,11 @@ impl Steps {
             .ask("2. Start the motor slowly at the panel, where that can be done safely; then press Enter")
             .await?;
         let mut drive = self.drive();
-        let running = self.until(&mut *drive, |status| status.state == State::Running).await?;
+        let running = self.until(&mut *drive, |status| status.motion == Motion::Driven).await?;
         console.say(format_args!("the drive shows {running}"))?;
         self.agreed(console, "Does the panel show the same speed, and does the motor turn that way?").await?;
         console.ask("Stop it at the panel; then press Enter").await?;
-        let rests =
-            |status: &Status| matches!(status.state, State::Ready | State::NotReady | State::Disabled);
+        let rests = |status: &Status| status.motion.is_undriven() || status.motion == Motion::Held;
         let stands = self.until(&mut *drive, rests).await?;
         console.say(format_args!("the drive shows {stands}"))?;
         self.agreed(console, "Does the motor stand?").await?;
@@ -107,7 +106,7 @@ impl Steps {
             )
             .await?;
         let mut drive = self.drive();
-        let turned = drive.status().await.map_err(|error| self.failed(&error))?.state == State::Running;
+        let turned = drive.status().await.map_err(|error| self.failed(&error))?.motion == Motion::Driven;
         let mut one = self.commanded()?;
         let stopped = one.stop(StopMode::Ramp).await;
         let (modes, status) = stopped?;
