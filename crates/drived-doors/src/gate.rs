@@ -451,8 +451,10 @@ impl Gate {
 
     fn log_out(&self, door: &Door, caller: &Caller, headers: &HeaderMap) -> Response {
         if let Some(session) = sessions::cookie(headers) {
-            self.sessions.end(session);
-            self.changes.send_replace(());
+            // Whoever may see may say any cookie: only the end of a session that was there is written and told.
+            if self.sessions.end(session) {
+                self.changes.send_replace(());
+            }
         }
         self.audit.record(Record::new(Kind::Logout, caller, "logout")).whenever();
         told(caller, None, door.encrypted)
@@ -546,7 +548,8 @@ impl From<TokenError> for Unlet {
 /// Whether a path is that of a stop.
 fn is_stop(path: &str) -> bool {
     let Some(path) = path.strip_prefix("/api/v1/") else { return false };
-    path == "stop" || (path.starts_with("drives/") || path.starts_with("groups/")) && path.ends_with("/stop")
+    matches!(path, "stop" | "selected/stop")
+        || (path.starts_with("drives/") || path.starts_with("groups/")) && path.ends_with("/stop")
 }
 
 /// The body of a request, as far as it may go.

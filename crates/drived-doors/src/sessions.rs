@@ -67,9 +67,13 @@ impl Sessions {
         (*ends > now).then(|| token.clone())
     }
 
-    pub(super) fn end(&self, secret: &str) {
-        lock(&self.0.open).remove(&sha256(secret.as_bytes()));
-        self.keep();
+    /// Ends a session; gives whether there was one.
+    pub(super) fn end(&self, secret: &str) -> bool {
+        let was = lock(&self.0.open).remove(&sha256(secret.as_bytes())).is_some();
+        if was {
+            self.keep();
+        }
+        was
     }
 
     /// Has them written, and waits for no disk: a stop looks for its session meanwhile.
@@ -91,6 +95,8 @@ impl Sessions {
             .collect();
         let written = serde_json::to_vec(&known).map_err(Into::into);
         if let Err(error) = written.and_then(|content| file.replace(&content, Readers::Owner)) {
+            // Who has logged out does not come back by what stood there before.
+            let _ = std::fs::remove_file(file.path());
             tracing::warn!("{}: {error}: a restart ends all sessions", file.path().display());
         }
     }

@@ -8,6 +8,20 @@ use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _, DuplexStream};
 use super::{gate::Peer, *};
 use crate::testing::{Asked, Rig, START, STATE, STOP};
 
+/// Whoever may only stop passes with each route that stops, and with none that looks like one.
+#[tokio::test]
+async fn a_stop_of_those_that_are_selected_passes_like_every_other() {
+    let rig = Rig::new("gate-selected");
+    for name in ["stop", "selected/stop", "drives/pump 1/stop", "groups/pumps/stop"] {
+        let path = format!("/api/v1/{}", name.replace(' ', "%20"));
+        let status = rig.ask(&Asked { path: &path, ..STOP }).await.status;
+        assert!([StatusCode::OK, StatusCode::NOT_FOUND].contains(&status), "{name}: {status}");
+    }
+    for name in ["selected/start", "selected/reset", "drives/stop/start", "stopped", "alarms/stop"] {
+        rig.ask(&Asked { path: &format!("/api/v1/{name}"), ..STOP }).await.assert_refused(401);
+    }
+}
+
 #[tokio::test]
 async fn on_loopback_to_see_and_to_stop_need_no_login_and_a_proxy_is_no_loopback() {
     let rig = Rig::new("freely");

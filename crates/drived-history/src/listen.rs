@@ -172,8 +172,12 @@ async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
                     inbox.record(record);
                 }
             }
-            // How many there were nobody knows.
-            Next::Reset(_) => inbox.lose_records(1),
+            // A reload, or too much at once: whether something is missing nobody knows.
+            Next::Reset(_) => inbox.record(Record::of_history(
+                clocks.now(),
+                "stream_anew",
+                "the configuration was read again, or too much happened at once: what was told just before may be missing here",
+            )),
             Next::End => return,
         }
     }

@@ -42,10 +42,13 @@ impl Past for InFile {
         };
         match every_ms {
             Some(every) => {
-                let at_once = every.max(&1).saturating_mul(i64::try_from(AT_ONCE).unwrap_or(i64::MAX));
-                let end = from_unix_ms.saturating_add(at_once).min(*to_unix_ms);
-                view.steps = read::steps(&history.0, drive, quantity, *from_unix_ms, end, *every)?;
-                view.next_from_unix_ms = (end < *to_unix_ms).then_some(end);
+                let every = (*every).max(1);
+                let at_once = every.saturating_mul(i64::try_from(AT_ONCE).unwrap_or(i64::MAX));
+                // A page ends with a whole step: none is told twice.
+                let first = from_unix_ms.saturating_sub(from_unix_ms.rem_euclid(every));
+                let end = first.saturating_add(at_once - 1).min(*to_unix_ms);
+                view.steps = read::steps(&history.0, drive, quantity, *from_unix_ms, end, every)?;
+                view.next_from_unix_ms = (end < *to_unix_ms).then(|| end + 1);
             }
             None => read::points(&history.0, drive, quantity, *from_unix_ms, *to_unix_ms, |point| {
                 let is_full = view.points.len() >= AT_ONCE;
@@ -70,8 +73,8 @@ impl Past for InFile {
             limit,
             after: asked.after,
         };
-        let records = read::records(&history.0, &filter)?;
-        let next_after = records.last().filter(|_| records.len() == limit).map(|last| last.number);
+        let read::Found { records, is_cut } = read::records(&history.0, &filter)?;
+        let next_after = records.last().filter(|_| is_cut).map(|last| last.number);
         Ok(RecordsView { records, next_after })
     }
 

@@ -70,7 +70,7 @@ fn last(path: &Path) -> Option<i64> {
 fn numbers(history: &History) -> Vec<i64> {
     let filter =
         Filter { from_ms: 0, to_ms: i64::MAX, kind: Some("event"), limit: usize::MAX, ..Filter::default() };
-    records(&history.0, &filter).unwrap().iter().map(|found| found.text.parse().unwrap()).collect()
+    records(&history.0, &filter).unwrap().records.iter().map(|found| found.text.parse().unwrap()).collect()
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn a_writer_that_is_killed_at_any_write_loses_nothing_that_it_said_was_written()
             ..Filter::default()
         };
         let told: Vec<String> =
-            records(&history.0, &filter).unwrap().into_iter().map(|found| found.what).collect();
+            records(&history.0, &filter).unwrap().records.into_iter().map(|found| found.what).collect();
         let killed = told.iter().filter(|what| *what == "began_after_kill").count();
         assert!(killed + 1 == told.len() && killed <= kill, "{told:?}");
     }

@@ -51,7 +51,11 @@ pub(crate) fn one_line(error: &clap::Error, arguments: &[String], root: &Command
             let such = SUCH_AS.iter().filter(|(name, _)| missing.contains(name)).map(|(_, such)| *such);
             such.take(2).fold(String::new(), |told, such| format!("{told}, {such}"))
         }
-        ErrorKind::ArgumentConflict => ": leave one of them out".to_owned(),
+        // A drive of a line of one's own, said where a drive of the daemon has its name.
+        ErrorKind::ArgumentConflict => match named_drive(command, arguments) {
+            Some(drive) => format!(": did you mean --drive {drive}?"),
+            None => ": leave one of them out".to_owned(),
+        },
         _ => String::new(),
     };
     let usage = message.lines().find_map(|line| line.strip_prefix("Usage: "));
@@ -100,6 +104,14 @@ fn subcommands(root: &Command, command: &Command, called: &str, word: &str) -> V
     }
     let with = root.get_subcommands().filter(|one| by_name(one).iter().any(|name| name == word));
     with.map(|one| format!("drived {} {word}", one.get_name())).collect()
+}
+
+/// A drive as `--drive` takes it, where `--line` was given and `--drive` was not.
+fn named_drive<'a>(command: &Command, arguments: &'a [String]) -> Option<&'a String> {
+    let has_drive = command.get_arguments().any(|argument| argument.get_long() == Some("drive"));
+    let is_given = |long: &str| arguments.iter().any(|word| word.starts_with(long));
+    let drive = arguments.iter().find(|word| word.contains('@') && !word.starts_with('-'));
+    drive.filter(|_| has_drive && is_given("--line") && !is_given("--drive"))
 }
 
 /// What was meant by an argument that the subcommand does not know.
@@ -167,7 +179,7 @@ mod tests {
             (&["scan", "--lin", port], "did you mean --line?"),
             (&["scan", "--line", "COM3,", "19200,", "8E1"], "write it without spaces, COM3,19200,8E1"),
             (&["scan", "--line", port, "--addresses", "1", "2", "3"], "did you mean --addresses 1,2,3?"),
-            (&["status", "--line", port, "atv312@1"], "such as --drive atv312@1"),
+            (&["status", "--line", port, "atv312@1"], "did you mean --drive atv312@1?"),
             (&["param", "restore"], "such as pump1.toml, as drived param backup writes it"),
             (&["completions", "bahs"], "did you mean bash?"),
             (

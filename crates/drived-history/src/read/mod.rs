@@ -13,7 +13,7 @@ use rusqlite::{Connection, OptionalExtension as _, params};
 
 pub use self::{
     frames::{Frame, frames},
-    records::{Filter, records},
+    records::{Filter, Found, records},
     steps::{pack_minutes, steps},
 };
 use crate::{

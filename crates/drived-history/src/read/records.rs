@@ -21,11 +21,23 @@ pub struct Filter<'a> {
     pub after: i64,
 }
 
+/// How much is read at once, in bytes: a command for a whole plant is long, and whoever asks is any viewer.
+const BYTES: usize = 8 << 20;
+
+/// What was found.
+#[derive(Debug)]
+pub struct Found {
+    /// In the daemon's own order.
+    pub records: Vec<RecordView>,
+    /// Whether there may be more behind them.
+    pub is_cut: bool,
+}
+
 /// What happened, in the daemon's own order.
 ///
 /// # Errors
 /// It cannot be read.
-pub fn records(connection: &Connection, filter: &Filter<'_>) -> Result<Vec<RecordView>, StoreError> {
+pub fn records(connection: &Connection, filter: &Filter<'_>) -> Result<Found, StoreError> {
     let mut find = connection.prepare_cached(
         "SELECT id, run, wall_ms, steady_ms, kind, what, drive, line, alarm, text, body FROM record
          WHERE wall_ms BETWEEN ?1 AND ?2 AND id > ?3
@@ -51,5 +63,16 @@ pub fn records(connection: &Connection, filter: &Filter<'_>) -> Result<Vec<Recor
             })
         },
     )?;
-    Ok(rows.collect::<Result<_, _>>()?)
+    let (mut records, mut bytes) = (Vec::new(), 0);
+    for row in rows {
+        let found: RecordView = row?;
+        bytes += size_of::<RecordView>() + found.text.len();
+        bytes += found.body.as_ref().map_or(0, |body| body.get().len());
+        records.push(found);
+        if bytes > BYTES {
+            return Ok(Found { records, is_cut: true });
+        }
+    }
+    let is_cut = records.len() >= filter.limit;
+    Ok(Found { records, is_cut })
 }

@@ -131,8 +131,12 @@ fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     match on_line.len() {
         0 => {
             let others = match neighbours.is_empty() {
-                true => "it is the only drive that is known of its line".to_owned(),
-                false => "no other drive of its line was lost with it".to_owned(),
+                // A drive to which nothing happened has no record: that nobody else is there is not known.
+                true => "nothing is recorded of another drive of its line around then".to_owned(),
+                false => format!(
+                    "no other drive of its line is recorded as lost within {} s of it",
+                    2 * TOGETHER_MS / 1_000
+                ),
             };
             vec![
                 Sentence::of(Seen, others),
@@ -178,6 +182,10 @@ fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                     Sentence::of(Likely, format!("a command of here came shortly before: {}", asked.text))
                         .at(asked.time_unix_ms),
                 ),
+                None if facts.is_cut => said.push(Sentence::of(
+                    NotKnown,
+                    "no command of here is among what was read, and more is recorded",
+                )),
                 None => said.push(Sentence::of(Seen, "nobody here asked for it")),
             }
             said.push(Sentence::of(

@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::{
     quantity::Quantity,
-    read::{Filter, pieces, records},
+    read::{Filter, Found, pieces, records},
     store::StoreError,
 };
 
@@ -42,7 +42,7 @@ impl Facts {
         let (first, last) = kept(connection)?;
         let (from, to) = ((at - BEFORE_MS).max(first), (at + AFTER_MS).min(last));
         let filter = Filter { from_ms: from, to_ms: to, limit: RECORDS, ..Filter::default() };
-        let records = records(connection, &filter)?;
+        let Found { records, is_cut } = records(connection, &filter)?;
         let of_drive = |found: &&RecordView| found.drive.as_deref() == Some(drive);
         let line = records.iter().filter(of_drive).find_map(|found| found.line.clone());
         let spans: Vec<(i64, i64)> = pieces(connection, drive, Quantity::STATE, from, to)?
@@ -61,7 +61,6 @@ impl Facts {
         if to - until > GAP_MS {
             gaps.push((until, to));
         }
-        let is_cut = records.len() >= RECORDS;
         let known = known as f64 / (to - from).max(1) as f64;
         Ok(Self { drive: drive.to_owned(), line, from, to, records, is_cut, known, gaps })
     }
@@ -82,10 +81,10 @@ impl Facts {
 
     /// What the drive said of a trip, where that was read.
     pub(super) fn explained(&self, trip: &RecordView) -> Option<&RecordView> {
-        let is_it = |found: &&RecordView| {
-            found.what == "trip_explained" && found.number > trip.number && self.is_of_drive(found)
-        };
-        self.records.iter().find(is_it).filter(|_| trip.what == "tripped")
+        let later = self.records.iter().filter(|found| found.number > trip.number && self.is_of_drive(found));
+        // What is explained behind the next trip is that one.
+        let mut own = later.take_while(|found| found.what != "tripped");
+        own.find(|found| found.what == "trip_explained").filter(|_| trip.what == "tripped")
     }
 
     /// An event in words, a trip with what the drive said of it.

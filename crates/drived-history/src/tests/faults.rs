@@ -26,7 +26,7 @@ const HZ: Quantity = Quantity::OUTPUT_FREQUENCY;
 
 fn all(connection: &Connection) -> Vec<RecordView> {
     let filter = Filter { from_ms: 0, to_ms: i64::MAX, limit: 1_000_000, ..Filter::default() };
-    records(connection, &filter).unwrap()
+    records(connection, &filter).unwrap().records
 }
 
 fn words(connection: &Connection) -> Vec<String> {

@@ -172,6 +172,9 @@ fn short(piece: Piece) -> Vec<Piece> {
     }
 }
 
+/// What belongs to a freeze-frame that is gone.
+const NO_FRAME: &str = "DELETE FROM frame_block WHERE frame NOT IN (SELECT id FROM frame)";
+
 /// Takes away some of what is too old, or, where the file is too large, of what is oldest; gives whether there may be more.
 ///
 /// # Errors
@@ -188,12 +191,15 @@ pub fn trim(connection: &Connection, now_ms: i64, limits: &Limits) -> Result<boo
         gone += trim_table(connection, table, &format!("{column} < {}", now_ms.saturating_sub(age)))?;
     }
     gone += connection
+        .execute("DELETE FROM hour WHERE start_ms < ?1", [now_ms.saturating_sub(limits.years_ms)])?;
+    gone += connection
         .execute("DELETE FROM line_minute WHERE wall_ms < ?1", [now_ms.saturating_sub(limits.minutes_ms)])?;
     if used_bytes(connection)? > limits.bytes {
         // What is finest goes first: an hour of ten years ago tells more than a second of yesterday.
-        for table in ["block", "minute"] {
+        for table in ["block", "minute", "frame"] {
             gone += trim_table(connection, table, "1")?;
             if gone > 0 {
+                connection.execute(NO_FRAME, [])?;
                 return Ok(true);
             }
         }
@@ -201,7 +207,7 @@ pub fn trim(connection: &Connection, now_ms: i64, limits: &Limits) -> Result<boo
             connection.execute("DELETE FROM hour WHERE start_ms = (SELECT min(start_ms) FROM hour)", [])?;
         gone += trim_table(connection, "record", "1")?;
     }
-    connection.execute("DELETE FROM frame_block WHERE frame NOT IN (SELECT id FROM frame)", [])?;
+    connection.execute(NO_FRAME, [])?;
     Ok(gone > 0)
 }
 

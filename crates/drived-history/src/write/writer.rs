@@ -132,9 +132,21 @@ impl<C: Fn() -> Moment> Work<C> {
         if let Some((aside, why)) = &opened.aside {
             self.tell_aside(aside, why, now);
         }
-        self.archive
-            .begin_run(&mut opened.store.connection, concat!("drived ", env!("CARGO_PKG_VERSION")))?;
-        Ok(opened.store)
+        let begun = self
+            .archive
+            .begin_run(&mut opened.store.connection, concat!("drived ", env!("CARGO_PKG_VERSION")));
+        match begun {
+            Ok(()) => Ok(opened.store),
+            // Its head was sound, and what lies behind it is not.
+            Err(error) if error.is_damage() => {
+                drop(opened);
+                let aside = store::put_aside(&self.writer.path)?;
+                self.tell_aside(&aside, &error.to_string(), now);
+                self.archive.begin_file(now);
+                Err(StoreError::Damaged(error.to_string()))
+            }
+            Err(error) => Err(error),
+        }
     }
 
     fn tell_aside(&mut self, aside: &std::path::Path, why: &str, now: Moment) {

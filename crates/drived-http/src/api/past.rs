@@ -56,6 +56,7 @@ pub(super) async fn values(
     query: Result<Query<Values>, QueryRejection>,
 ) -> Result<Response, Problem> {
     let Query(Values { value, from_unix_ms, to_unix_ms, every_ms }) = query?;
+    are_moments([from_unix_ms, to_unix_ms])?;
     if every_ms.is_some_and(|every| every < 1) {
         return Err(Problem::new(StatusCode::BAD_REQUEST, "every_ms: expected 1 or more"));
     }
@@ -69,6 +70,7 @@ pub(super) async fn records(
     query: Result<Query<Records>, QueryRejection>,
 ) -> Result<Response, Problem> {
     let Query(Records { from_unix_ms, to_unix_ms, drive, kind, after, limit }) = query?;
+    are_moments([from_unix_ms, to_unix_ms])?;
     let after = after.unwrap_or_default();
     let asked = RecordsAsked { from_unix_ms, to_unix_ms, drive, kind, after, limit };
     told(&plant, move |past| past.records(&asked)).await
@@ -81,7 +83,17 @@ pub(super) async fn why(
     query: Result<Query<At>, QueryRejection>,
 ) -> Result<Response, Problem> {
     let Query(At { at_unix_ms }) = query?;
+    are_moments([at_unix_ms])?;
     told(&plant, move |past| past.story(&drive, at_unix_ms)).await
+}
+
+/// Refuses what is no moment of this calendar: behind it nobody has to think of what overflows. The bounds are those of ECMAScript.
+fn are_moments<const N: usize>(all: [i64; N]) -> Result<(), Problem> {
+    const FARTHEST: i64 = 8_640_000_000_000_000;
+    match all.iter().find(|one| !(-FARTHEST..=FARTHEST).contains(*one)) {
+        None => Ok(()),
+        Some(one) => Err(Problem::new(StatusCode::BAD_REQUEST, format!("{one} is no time in milliseconds"))),
+    }
 }
 
 /// Asks whoever keeps the past, on a thread that may wait for a disk.
@@ -96,10 +108,10 @@ async fn told<T: Serialize + Send + 'static>(
     let answer = spawn_blocking(move || {
         // It is given up when it has been read, also where nobody waits for the answer any more.
         let _place = place;
-        ask(&*past)
+        ask(&*past).map(|view| fresh(&view))
     });
     match answer.await.map_err(|error| unreadable(error.to_string()))? {
-        Ok(view) => Ok(fresh(&view)),
+        Ok(answer) => Ok(answer),
         Err(error @ PastError::Asked(_)) => Err(Problem::new(StatusCode::BAD_REQUEST, error.to_string())),
         Err(error) => Err(unreadable(error.to_string())),
     }

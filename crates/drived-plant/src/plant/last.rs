@@ -2,18 +2,19 @@
 
 use std::{
     borrow::Cow,
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     sync::{Mutex, PoisonError},
 };
 
 use serde::{Deserialize, Serialize};
-use tokio::sync::watch;
+use tokio::{sync::watch, time::Instant};
 
 use super::{
     Inner, Plant,
     commands::{ActionWord, OutcomeWord},
     views::CommandView,
 };
+use drived_words::json::unix;
 
 /// What became of a command of a drive, whoever gave it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -80,12 +81,18 @@ impl Inner {
     /// What arrived earlier is not the last, though its outcome may come later.
     fn note_last_command(&self, drive: &str, last: LastCommandView) {
         let mut commands = self.last_commands.by_drive.lock().unwrap_or_else(PoisonError::into_inner);
-        if commands.get(drive).is_some_and(|known| known.arrived_unix_ms > last.arrived_unix_ms) {
+        // One of the future was noted before the clock was set back.
+        let now = unix(Instant::now());
+        let is_newer =
+            |known: &LastCommandView| (last.arrived_unix_ms + 1..=now).contains(&known.arrived_unix_ms);
+        if commands.get(drive).is_some_and(is_newer) {
             return;
         }
-        if commands.insert(drive.to_owned(), last).is_none() {
-            // Drives come and go: who is not there any more is not remembered.
-            commands.retain(|name, _| self.fleet.drive(name).is_some());
+        if commands.insert(drive.to_owned(), last).is_none() && commands.len().is_power_of_two() {
+            // Drives come and go: who is not there any more is not remembered. Seldom, for a stop of all passes here.
+            let known: BTreeSet<String> =
+                self.fleet.drives().iter().map(|drive| drive.name().to_string()).collect();
+            commands.retain(|name, _| known.contains(name));
         }
         self.last_commands.changed.send_modify(|times| *times += 1);
     }

@@ -228,9 +228,9 @@ impl Asked<'_> {
                 ..Filter::default()
             };
             let found = read::records(&self.history.0, &filter).map_err(failed)?;
-            found.iter().try_for_each(&mut each)?;
-            match found.last() {
-                Some(last) if found.len() == AT_ONCE => after = last.number,
+            found.records.iter().try_for_each(&mut each)?;
+            match found.records.last() {
+                Some(last) if found.is_cut => after = last.number,
                 _ => return Ok(()),
             }
         }

@@ -154,7 +154,7 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
         (_, "FILE|DRIVE|factory") => {
             drives().and(Offers::of([whole("factory", "the factory setting")])).and(Offers::files())
         }
-        (_, "FILE" | "PATH" | "LINK" | "FOLDER" | "DIR" | "FILE|FOLDER") => Offers::files(),
+        (_, "FILE" | "FILE|HEX" | "PATH" | "LINK" | "FOLDER" | "DIR" | "FILE|FOLDER") => Offers::files(),
         (_, "FAMILY") => families(),
         (_, "PROFILE") => {
             let all = profiles::all();
