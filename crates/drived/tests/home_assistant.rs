@@ -220,11 +220,11 @@ fn at_home_assistant_itself_a_drive_is_commanded_trips_is_lost_and_acknowledged_
 
     // A drive gets another name while the daemon is away: its entities stay.
     daemon.kill();
+    home.wait("binary_sensor.pump_2_answers", "unavailable");
     let text = fs::read_to_string(daemon.file.path()).expect("it is ours");
     fs::write(daemon.file.path(), text.replace("pump {}", "fan {}")).expect("it is ours");
     home.say("forget");
     daemon.start_again();
-    home.wait("binary_sensor.pump_2_answers", "unavailable");
     home.wait("binary_sensor.pump_2_answers", "on");
     home.say("named binary_sensor.pump_2_answers fan 2");
     assert!(!home.seen("binary_sensor.pump_2_answers").contains(&"-".to_owned()), "it is never taken away");

@@ -107,7 +107,8 @@ fn what_cannot_be_listened_to_is_refused_with_the_reason() {
         (&["explain", "--line", "tcp://127.0.0.1:1"][..], "Modbus TCP cannot be listened to"),
         (&["explain", "--line", "/dev/no-such-port,19200,8E1"], "there is no serial port"),
         (&["explain", "--line", "/dev/no-such-port"], "say which speed and format the line has"),
-        (&["explain"], "FILE"),
+        // Nothing comes by the pipe either.
+        (&["explain"], "standard input: nothing in it looks like a frame"),
         (&["capture", "--to", "/tmp/never"], "LINE"),
     ] {
         run(arguments).assert_refused(2, reason);
@@ -189,5 +190,5 @@ fn what_was_heard_is_played_back_to_whoever_asks_the_same() {
     assert!(rest.contains("3 requests, 2 answers; 1 not in the capture"), "{rest}");
     fs::remove_file(&file).unwrap();
     run(&["replay", "/dev/null", "--pty", pty])
-        .assert_refused(2, "/dev/null: not a little-endian pcapng file");
+        .assert_refused(2, "/dev/null: it is a device: expected a file, or a pipe");
 }

@@ -179,9 +179,13 @@ fn an_unknown_log_level_and_too_few_file_descriptors_are_refused() {
 
 #[test]
 fn a_setpoint_below_zero_or_without_a_unit_is_refused() {
-    for setpoint in ["-5Hz", "30"] {
+    for (setpoint, reason) in [
+        ("-5Hz", "a setpoint has no sign, the direction is that of the start"),
+        ("30", "\"30\" of what?"),
+        ("5.001Hz", "a frequency with at most two decimals such as 47.5 Hz"),
+    ] {
         run(&["setpoint", setpoint, "--line", "/dev/nowhere", "--drive", "atv312@1"])
-            .assert_refused(2, "a frequency with at most two decimals such as 47.5 Hz");
+            .assert_refused(2, reason);
     }
 }
 
