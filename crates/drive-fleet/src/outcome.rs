@@ -527,6 +527,8 @@ impl Refused {
             Self::Limit(LimitProblem::Forbidden { .. }) => "forbidden_band",
             Self::Limit(_) | Self::Drive(Error::Setpoint { .. }) => "limit",
             Self::Drive(Error::Unsupported { .. }) => "unsupported",
+            // The drive has said nothing: that is no refusal of what was asked.
+            Self::Drive(Error::Port { .. }) => "no_answer",
             Self::Drive(_) => "drive",
             Self::QueueFull => "queue_full",
             Self::ShutDown => "shut_down",

@@ -58,7 +58,8 @@ fn the_report_of_the_daemon_has_its_drives_groups_and_lines_by_name_and_their_pa
             run(&["report", name, "--socket", socket, "--to", to, "--without-parameters", "--overwrite"]);
         assert!(told.assert_done().contains(&format!(": {drives}\n")), "{told:?}");
     }
-    run(&["report", "pump 3", "--socket", socket, "--to", to]).assert_refused(2, "no drive and no group");
+    run(&["report", "pump 3", "--socket", socket, "--to", to, "--overwrite"])
+        .assert_refused(2, "no drive and no group");
     run(&["report", "pump 1", "--socket", socket, "--to", to]).assert_refused(2, "--overwrite");
     run(&["report", "pump 1", "--socket", socket, "--to", to, "--overwrite"]).assert_done();
     look(&file, "daemon");

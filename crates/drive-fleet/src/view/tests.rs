@@ -442,7 +442,7 @@ fn a_stop_of_several_drives_names_each_that_is_not_confirmed() {
         report,
         json!({
             "confirmed": ["pump 1"], "read_only": [], "broadcasts": [],
-            "unconfirmed": [{"drive": "pump 2", "outcome": "refused", "reason": "drive", "text": "slave 2, function 06h: the line is closed",
+            "unconfirmed": [{"drive": "pump 2", "outcome": "refused", "reason": "no_answer", "text": "slave 2, function 06h: the line is closed",
                 "error": {"kind": "not_sent", "text": "slave 2, function 06h: the line is closed"}}]
         }),
     );

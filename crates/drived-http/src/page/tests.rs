@@ -254,7 +254,7 @@ fn every_command_of_the_page_has_an_id_and_a_stop_is_tried_as_by_the_monitor() {
     for (path, text) in modules() {
         for given in text.split("post(`").skip(1) {
             assert!(
-                given.starts_with("${where}?wait=0`, { id, ...body })"),
+                given.starts_with("${where}?wait=0`, { id, ...body }, "),
                 "{path} gives a command without an id"
             );
         }
@@ -271,8 +271,12 @@ fn every_command_of_the_page_has_an_id_and_a_stop_is_tried_as_by_the_monitor() {
     assert_eq!(looks(include_str!("web/stop.js")), looks(module("follow.js")));
     let times =
         [("ATTEMPT", client::ANSWERED_WITHIN), ("AGAIN", client::AGAIN), ("GIVEUP", client::GIVEN_UP_AFTER)];
+    // A stop of one drive, of a group or of a selection is tried so too, and nothing else.
+    let orders = module("orders.js").replace('_', "");
     for (name, time) in times {
         let row = format!("const {name}MS = {};", time.as_millis());
-        assert!(stop.contains(&row), "{row}");
+        assert!(stop.contains(&row) && orders.contains(&row), "{row}");
     }
+    assert_eq!(orders.matches("await sendAgain(").count(), 1);
+    assert!(orders.contains("action === 'stop') answer = await sendAgain("), "a start is never sent again");
 }

@@ -32,9 +32,9 @@ export function read(where) {
   return send(where, { method: 'GET' });
 }
 
-/** Sends a document: `POST`, or `PUT` where it is said. */
-export function post(where, body = {}, method = 'POST') {
-  return send(where, { method, headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body) });
+/** Sends a document: `POST`, or `PUT` where it is said; for so long at most. */
+export function post(where, body = {}, method = 'POST', withinMs = WITHIN_MS) {
+  return send(where, { method, headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body) }, withinMs);
 }
 
 /** The address of a document, for links. */
@@ -42,9 +42,9 @@ export function address(where) {
   return ROOT + where;
 }
 
-async function send(where, options) {
+async function send(where, options, withinMs = WITHIN_MS) {
   const limit = new AbortController();
-  const timer = setTimeout(() => limit.abort(), WITHIN_MS);
+  const timer = setTimeout(() => limit.abort(), withinMs);
   try {
     const response = await fetch(ROOT + where, { credentials: 'same-origin', signal: limit.signal, ...options });
     const text = await response.text();

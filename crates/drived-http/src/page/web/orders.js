@@ -1,4 +1,4 @@
-// Commands on their way: sent once, followed until they are settled, told in words and time.
+// Commands on their way: sent once, a stop until its fate is known; followed until they are settled, told in words and time.
 
 import { commandId, path, post, read } from './api.js';
 import { el, setClass, setText } from './dom.js';
@@ -15,7 +15,11 @@ const KEPT = 20;
 const SHOWN_MS = 12_000;
 /** How often a command is asked after of which nobody knows whether it arrived. */
 const TRIES = 20;
-const AGAIN_MS = 1_000;
+const LOOK_AGAIN_MS = 1_000;
+/** How a stop is sent, as STOP ALL is. */
+const ATTEMPT_MS = 2_000;
+const AGAIN_MS = 500;
+const GIVE_UP_MS = 60_000;
 
 const orders = [];
 const listeners = new Set();
@@ -34,10 +38,11 @@ export function onOrder(listener) {
 /** Gives a command at this address, and ends when its outcome is known; what becomes of it later is told all the same. */
 export function command(to, action, where, body = {}) {
   const id = commandId();
-  return carryOut(to, action, () => post(`${where}?wait=0`, { id, ...body }), id);
+  const within = action === 'stop' ? ATTEMPT_MS : undefined;
+  return carryOut(to, action, () => post(`${where}?wait=0`, { id, ...body }, 'POST', within), id);
 }
 
-/** Sends by `send`, as `command` does; what has no id cannot be asked after. */
+/** Sends by `send`, as `command` does, once and a stop again; what has no id cannot be asked after. */
 export async function carryOut(to, action, send, id) {
   const order = { to, action, id, at: daemonNow(), outcome: 'pending' };
   orders.unshift(order);
@@ -48,7 +53,9 @@ export async function carryOut(to, action, send, id) {
     answer = await send();
     take(order, answer);
   } catch (problem) {
-    answer = fail(order, problem) ?? (problem.isUnheard && await find(order));
+    answer = fail(order, problem);
+    if (!answer && action === 'stop') answer = await sendAgain(order, send, problem);
+    else if (!answer && problem.isUnheard) answer = await find(order);
   }
   tell(order);
   if (answer?.open) await settled(order, answer);
@@ -82,12 +89,34 @@ function settled(order, answer) {
   });
 }
 
+/** Sends a stop under its one id, by which the daemon carries it out once, until its fate is known. Nothing else is ever sent again. */
+async function sendAgain(order, send, problem) {
+  const began = Date.now();
+  for (let tries = 2; problem.isUnheard || problem.status >= 500 || problem.status === 429; tries++) {
+    const isOver = Date.now() - began > GIVE_UP_MS;
+    Object.assign(order, { outcome: 'unknown', text: t(isOver ? 'stop_given_up' : 'stop_sent_again', { tries, why: problem.isUnheard ? t('not_reached') : told(problem.message) }) });
+    if (isOver) return undefined;
+    tell(order);
+    await new Promise(over => setTimeout(over, AGAIN_MS));
+    try {
+      const answer = await send();
+      take(order, answer);
+      return answer;
+    } catch (next) {
+      problem = next;
+      const answer = fail(order, problem);
+      if (answer) return answer;
+    }
+  }
+  return undefined;
+}
+
 /** Asks what became of a command of which nobody knows whether it arrived: the daemon knows it by its id. */
 async function find(order) {
   if (!order.id) return undefined;
   for (let tries = 0; tries < TRIES; tries++) {
     tell(order);
-    await new Promise(over => setTimeout(over, AGAIN_MS));
+    await new Promise(over => setTimeout(over, LOOK_AGAIN_MS));
     try {
       const answer = await read(`${path('commands', order.id)}?wait=0`);
       take(order, answer);
@@ -124,5 +153,6 @@ function tell(order) {
   if (!order.note.isConnected) place.prepend(order.note);
   setText(order.note, named(order.to, orderText(order)));
   setClass(order.note, 'bad', order.outcome !== 'pending' && !isDone(order));
-  if (order.outcome !== 'pending') setTimeout(() => order.note.remove(), SHOWN_MS);
+  clearTimeout(order.timer);
+  if (order.outcome !== 'pending') order.timer = setTimeout(() => order.note.remove(), SHOWN_MS);
 }

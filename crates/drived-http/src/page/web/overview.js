@@ -210,7 +210,7 @@ export function overview(root, _, isBack) {
     setClass(list, 'selectable', mayChoose());
     allBox.checked = shown.length > 0 && shown.every(drive => chosen.has(drive.name));
     allBox.indeterminate = !allBox.checked && shown.some(drive => chosen.has(drive.name));
-    selection.update();
+    selection.update(new Set(shown.map(drive => drive.name)));
   }
 
   function updateStrip() {
@@ -227,11 +227,22 @@ export function overview(root, _, isBack) {
     group.hidden = plant.groups.length === 0;
   }
 
+  /** A stop is sent whatever this page knows of the group; anything else to the drives that the question was about, or it is asked anew. */
   async function orderGroup(action) {
-    const those = plant.groups.find(one => one.name === asked.group);
-    const question = action !== 'stop' && t(`confirm_${action}_group`, { count: those.drives.length, group: those.name });
-    if (question && !await confirmed(those.drives, question, t(`${action}_group`))) return;
-    command(those.name, action, path('groups', those.name, action));
+    const name = asked.group;
+    const members = () => plant.groups.find(one => one.name === name)?.drives;
+    let those = members();
+    let note = '';
+    while (action !== 'stop') {
+      if (!those) return;
+      const question = t(`confirm_${action}_group`, { count: those.length, group: name });
+      if (!await confirmed(those, `${note}${question}`, t(`${action}_group`))) return;
+      const now = members();
+      if (now && String([...now].sort()) === String([...those].sort())) break;
+      note = `${t('group_changed')} `;
+      those = now;
+    }
+    command(name, action, path('groups', name, action));
   }
 }
 

@@ -29,7 +29,7 @@ export function mayChoose() {
   return Boolean(plant.daemon.rights.stop || plant.daemon.rights.operate);
 }
 
-/** The bar for the chosen names, a set; `changed()` is called when it is emptied. Gives `element`, `update()`. */
+/** The bar for the chosen names, a set; `changed()` is called when it is emptied. Gives `element`, `update(shown)`: the names that are shown. */
 export function selectionBar(chosen, changed) {
   const count = el('b', { role: 'status' });
   const button = (action, act) => el('button', { type: 'button', 'data-order': action, onclick: act });
@@ -41,10 +41,13 @@ export function selectionBar(chosen, changed) {
   const element = el('div.selection', { role: 'group', 'aria-label': t('orders'), hidden: true }, count, ...Object.values(buttons), none);
   return { element, update };
 
-  function update() {
+  function update(shown) {
     for (const name of chosen) if (!plant.drives.has(name)) chosen.delete(name);
     element.hidden = chosen.size === 0;
-    setText(count, chosen.size === 1 ? t('selected_one') : t('selected', { count: chosen.size }));
+    const selected = chosen.size === 1 ? t('selected_one') : t('selected', { count: chosen.size });
+    // Whom a search or a filter hides is commanded all the same.
+    const hidden = [...chosen].filter(name => !shown.has(name)).length;
+    setText(count, hidden ? t('selected_unseen', { selected, count: hidden }) : selected);
     for (const [action, one] of Object.entries(buttons)) {
       const fit = fitting(action);
       one.hidden = fit.length === 0;
@@ -57,8 +60,9 @@ export function selectionBar(chosen, changed) {
     changed();
   }
 
+  /** One that has left the plant since keeps no command from the others. */
   function fitting(action) {
-    return [...chosen].filter(name => FITS[action](plant.drives.get(name)));
+    return [...chosen].filter(name => plant.drives.has(name) && FITS[action](plant.drives.get(name)));
   }
 
   function give(action, body = {}, names = fitting(action)) {
@@ -86,12 +90,17 @@ export function selectionBar(chosen, changed) {
     give('setpoint', { setpoint: { frequency_hz: Number(field.value) } }, all);
   }
 
+  /** Who is commanded, and who of the chosen is not. */
   function question(text, names) {
     const out = [...chosen].filter(name => !names.includes(name));
-    const listed = out.slice(0, NAMED).join(', ');
-    const told = out.length > NAMED ? t('and_more', { names: listed, count: out.length - NAMED }) : listed;
-    return [t(text, { count: names.length }), out.length && t('left_out', { names: told })].filter(Boolean).join(' ');
+    return [t(text, { count: names.length }), t('these_are', { names: listed(names) }), out.length && t('left_out', { names: listed(out) })]
+      .filter(Boolean).join(' ');
   }
+}
+
+function listed(names) {
+  const first = names.slice(0, NAMED).join(', ');
+  return names.length > NAMED ? t('and_more', { names: first, count: names.length - NAMED }) : first;
 }
 
 /** What every one of these may be given, in hertz. */

@@ -20,7 +20,7 @@ pub(super) struct Carried {
     pub(super) written: Vec<Change>,
     /// What could not be written, or is not held though it was, with the reason.
     pub(super) refused: Vec<(&'static Row, String)>,
-    /// What was not written because something before it was refused.
+    /// What was not written because something before it was refused, or could not be restored at all.
     pub(super) held_back: Vec<&'static Row>,
     /// Why it ended before all was done.
     pub(super) stopped: Option<Stopped>,
@@ -56,8 +56,14 @@ impl Carried {
 pub(super) async fn carry(plan: &Plan, source: &mut Source, ending: &mut Ending) -> Carried {
     let rows: usize = plan.steps.iter().map(Vec::len).sum();
     let progress = Progress::of(format_args!("{}: restoring", source.name()), rows);
-    let mut carrying =
-        Carrying { source, ending, progress, way: plan.way.clone(), carried: Carried::default() };
+    let mut carrying = Carrying {
+        source,
+        ending,
+        progress,
+        way: plan.way.clone(),
+        is_whole: plan.missing.is_empty(),
+        carried: Carried::default(),
+    };
     for step in &plan.steps {
         if let Err(stopped) = carrying.step(step).await {
             carrying.carried.stopped = Some(stopped);
@@ -80,6 +86,8 @@ struct Carrying<'a> {
     progress: Progress,
     /// What the drive holds, as far as it is known.
     way: Way,
+    /// Nothing of the file is missing before the first write.
+    is_whole: bool,
     carried: Carried,
 }
 
@@ -113,11 +121,13 @@ impl Carrying<'_> {
         Ok(())
     }
 
-    /// Whether a register is written whatever was refused before it. Who commands, and where the drive is found, stays as it is.
+    /// Whether a register is written whatever was refused before it, or is missing: who then takes command has a drive that is not
+    /// set up as the file says. Who commands, and where the drive is found, stays as it is.
     fn goes_on_behind_a_refusal(&self, row: &Row) -> bool {
         let restoring = self.way.restoring();
         let is_line = restoring.part(row) == Part::Communication;
-        self.carried.refused.is_empty() || !(is_line || restoring.control.contains(&row.address))
+        let is_as_in_the_file = self.is_whole && self.carried.refused.is_empty();
+        is_as_in_the_file || !(is_line || restoring.control.contains(&row.address))
     }
 
     /// What else has to do with these changes, which the file does not have, or an earlier write may have changed.

@@ -161,6 +161,13 @@ async fn restore(
         )));
     }
     let now = source.keep().await?;
+    // Of a drive that tells nothing it is not known that nothing differs.
+    if let Some(why) = now.nothing_read() {
+        let failure = Failure::Drive(format!("{name}: {why}; nothing was written"));
+        let json = json!({ "drive": name, "file": path, "error": failure.to_string() });
+        let Value::Object(json) = json else { return Err(failure) };
+        return Ok(Told { text: Vec::new(), json, failure: Some((failure, false)) });
+    }
     let other = other_model(file, &now);
     let firmware = other_firmware(file, &now);
     if let Some(why) = other.as_ref().filter(|_| !args.other_model) {
@@ -184,7 +191,9 @@ async fn restore(
     json.insert("file".to_owned(), json!(path));
     json.extend(plan.json(file, &now).map(|(key, value)| (key.to_owned(), value)));
     let mut text = Vec::new();
-    if plan.changes.is_empty() {
+    if plan.changes.is_empty() && !plan.skipped.is_empty() {
+        text.push(format!("{name}: nothing to write of what can be restored from {}", path.display()));
+    } else if plan.changes.is_empty() {
         text.push(format!("{name}: nothing to write, it holds what {} has", path.display()));
     } else {
         let differ = output::counted(plan.changes.len(), "parameter differs", "parameters differ");
@@ -203,6 +212,11 @@ async fn restore(
         if !plan.changes.is_empty() {
             text.push("nothing has been written: --write does it, in this order".to_owned());
         }
+        // Some of that order is held back then.
+        if !plan.missing.is_empty() {
+            let codes: Vec<_> = plan.missing.iter().map(|row| row.code).collect();
+            text.push(format!("missing: {}: {HELD_BACK}", codes.join(", ")));
+        }
         return Ok(Told { text, json, failure: None });
     }
     if !args.source.daemon.is_json() {
@@ -219,8 +233,8 @@ async fn restore(
         let put_back = verify(file, source, args.with_communication, &plan, &mut carried).await;
         failure = put_back.map(|failure| (failure, false));
     }
-    if failure.is_none() && !carried.refused.is_empty() {
-        failure = Some((Failure::Drive(carried.refusals_in_words(&name)), true));
+    if failure.is_none() && !(carried.refused.is_empty() && plan.missing.is_empty()) {
+        failure = Some((Failure::Drive(carried.refusals_in_words(&name, &plan.missing)), true));
     }
     let mut saved = false;
     if failure.is_none() {
@@ -271,7 +285,7 @@ const NOT_SAVED: &str =
     "nothing was saved to EEPROM: see what is missing, then drived param save keeps what was written";
 
 const HELD_BACK: &str = "who commands, and where the drive is found, is only changed when everything else is as in the file; set \
-    what was refused, or take its line out of the file, and run it again";
+    what was refused or is missing, or take its line out of the file, and run it again";
 
 fn refusal_json(slave: u8, (row, why): &(&'static drive_core::Row, String)) -> Value {
     json!({ "slave": slave, "mnemonic": row.code, "address": row.address, "why": why })
@@ -321,11 +335,14 @@ async fn verify(
     plan: &Plan,
     carried: &mut Carried,
 ) -> Option<Failure> {
+    let unread = |why: String| Failure::Drive(format!("all is written, and not read once more: {why}"));
     let now = match source.keep().await {
-        Ok(now) => now,
-        Err(failure) => {
-            return Some(Failure::Drive(format!("all is written, and not read once more: {failure}")));
-        }
+        // What tells nothing any more has put nothing back.
+        Ok(now) => match now.nothing_read() {
+            Some(why) => return Some(unread(format!("{}: {why}", source.name()))),
+            None => now,
+        },
+        Err(failure) => return Some(unread(failure.to_string())),
     };
     let differences = Comparison::of(file, &now, with_communication).differences;
     let is_skipped =
@@ -370,17 +387,25 @@ async fn keep(args: &Args, source: &mut Source, carried: &Carried) -> Result<(bo
 }
 
 impl Carried {
-    /// What was refused, in a line; why stands with each.
-    fn refusals_in_words(&self, name: &str) -> String {
-        let refused = output::counted(self.refused.len(), "parameter was", "parameters were");
-        let codes: Vec<_> = self.refused.iter().map(|(row, _)| row.code).collect();
-        let codes = codes.join(", ");
-        if self.held_back.is_empty() {
-            return format!("{name}: {refused} refused: {codes}; the rest is as in the file");
+    /// What was refused, and what could not be restored, in a line; why stands with each.
+    fn refusals_in_words(&self, name: &str, missing: &[&'static drive_core::Row]) -> String {
+        let listed = |rows: &[&'static drive_core::Row]| {
+            let codes: Vec<_> = rows.iter().map(|row| row.code).collect();
+            codes.join(", ")
+        };
+        let refused: Vec<_> = self.refused.iter().map(|(row, _)| *row).collect();
+        let mut parts = Vec::new();
+        for (rows, what) in [(&*refused, "refused"), (missing, "not restored")] {
+            if !rows.is_empty() {
+                let counted = output::counted(rows.len(), "parameter was", "parameters were");
+                parts.push(format!("{counted} {what}: {}", listed(rows)));
+            }
         }
-        let held_back: Vec<_> = self.held_back.iter().map(|row| row.code).collect();
-        let held_back = held_back.join(", ");
-        format!("{name}: {refused} refused: {codes}; left as it was because of that: {held_back}")
+        parts.push(match &*self.held_back {
+            [] => "the rest is as in the file".to_owned(),
+            held_back => format!("left as it was because of that: {}", listed(held_back)),
+        });
+        format!("{name}: {}", parts.join("; "))
     }
 
     fn unknown(&self) -> Option<&'static str> {

@@ -19,6 +19,8 @@ pub(super) struct Plan {
     pub(super) changes: Vec<Change>,
     /// What differs, or may, and is not written, with the reason.
     pub(super) skipped: Vec<(&'static Row, String)>,
+    /// Of those the ones that nobody has left out: what the drive holds there is not known to be what the file has.
+    pub(super) missing: Vec<&'static Row>,
     /// What the drive holds now.
     pub(super) way: Way,
 }
@@ -34,10 +36,12 @@ impl Plan {
     /// How a drive that holds `now` comes to hold what the file says.
     pub(super) fn of(file: &Backup, now: &Backup, with_communication: bool) -> Result<Self, Failure> {
         let capabilities = file.head.family.capabilities();
-        let mut skipped = Vec::new();
+        let (mut skipped, mut missing) = (Vec::new(), Vec::new());
         for Entry { row, held } in &file.entries {
             let differs = held.as_ref().ok().copied() != now.word(row.address);
-            let why = match (capabilities.restoring.part(row), held) {
+            let part = capabilities.restoring.part(row);
+            let is_unread = held.is_err() || now.word(row.address).is_none();
+            let why = match (part, held) {
                 (Part::Rating | Part::Passing, _) => continue,
                 (_, Err(why)) => format!("could not be read when it was kept: {why}"),
                 (Part::Left(why) | Part::ByHand(why), Ok(_)) if differs => why.to_owned(),
@@ -49,6 +53,10 @@ impl Plan {
                 }
                 _ => continue,
             };
+            // Who leaves the line as it is, or sets at the drive what is only set there, has left it out himself.
+            if is_unread && (part == Part::Setting || part == Part::Communication && with_communication) {
+                missing.push(*row);
+            }
             skipped.push((*row, why));
         }
         let wanted = |row: &'static Row| {
@@ -77,7 +85,7 @@ impl Plan {
                 )));
             }
         }
-        Ok(Self { steps, changes, skipped, way })
+        Ok(Self { steps, changes, skipped, missing, way })
     }
 
     /// What has to be set at the drive before anything is written: it would load other values over them.

@@ -573,3 +573,73 @@ async fn the_eeprom_is_written_only_where_it_is_asked_for_or_the_drive_does_it_b
         }
     }
 }
+
+#[tokio::test(start_paused = true)]
+async fn of_a_drive_that_tells_nothing_nobody_says_that_it_holds_what_the_file_has() {
+    // The 3G3EV has no identification: the first that it does not answer is a parameter.
+    let file = Bench::kept(Family::OMRON_3G3EV).await;
+    for more in [&[][..], &["--write"]] {
+        let mut silent = Bench::of(Family::OMRON_3G3EV, SetUp::ForTheBus);
+        silent.machine.mute();
+        let told = say(&mut silent, &file, more).await.unwrap();
+        let Some((Failure::Drive(why), false)) = &told.failure else { panic!("{:?}", told.text) };
+        assert!(why.contains("nothing could be read") && why.ends_with("nothing was written"), "{why}");
+        assert!(!told.text.iter().any(|text| text.contains("nothing to write")), "{:?}", told.text);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_falls_silent_behind_the_last_write_has_put_nothing_back() {
+    let file = Bench::kept(Family::OMRON_3G3EV).await;
+    let mut new = Bench::of(Family::OMRON_3G3EV, SetUp::Factory);
+    let plan = new.plan(&file).await;
+    let mut carried = new.carry(&plan).await;
+    new.machine.mute();
+    let Some(Failure::Drive(why)) = verify(&file, &mut new.source, false, &plan, &mut carried).await else {
+        panic!("a drive that tells nothing is as the file says")
+    };
+    assert!(
+        why.starts_with("all is written, and not read once more: 3g3ev@1: nothing could be read"),
+        "{why}"
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_commands_stays_as_it_is_where_a_setting_of_the_file_could_not_be_read_or_restored() {
+    // Cd1 = tEr, the terminals (BBV51701 p. 36).
+    let kept = edited(Bench::kept(Family::ATV312).await, &[("Cd1", 1)]);
+    let unread = |mut backup: Backup| {
+        backup.entries.iter_mut().find(|entry| entry.row.code == "ACC").unwrap().held =
+            Err("mute".to_owned());
+        backup
+    };
+    for is_of_the_file in [true, false] {
+        let mut new = Bench::of(Family::ATV312, SetUp::ForTheBus);
+        let command = new.machine.peek(8_423);
+        assert_ne!(command, Some(1));
+        if is_of_the_file {
+            let told = say(&mut new, &unread(kept.clone()), &[]).await.unwrap();
+            assert!(told.text.iter().any(|text| text.starts_with("missing: ACC: who commands")));
+            let told = say(&mut new, &unread(kept.clone()), &["--write", "--save"]).await.unwrap();
+            let Some((Failure::Drive(why), true)) = &told.failure else { panic!("{:?}", told.failure) };
+            assert!(why.contains("1 parameter was not restored: ACC") && why.contains("Cd1"), "{why}");
+            assert_eq!(told.json["saved"], json!(false));
+            let held_back = told.json["held_back"].as_array().unwrap();
+            assert!(held_back.contains(&json!("Cd1")), "{held_back:?}");
+        } else {
+            let now = unread(new.source.keep().await.unwrap());
+            let plan = Plan::of(&kept, &now, false).unwrap();
+            let carried = new.carry(&plan).await;
+            assert!(carried.held_back.iter().any(|row| row.code == "Cd1"), "{carried:?}");
+        }
+        assert_eq!(new.machine.peek(8_423), command);
+        // The rest is written all the same: dEC.
+        assert_eq!(new.machine.peek(9_002), Some(250));
+    }
+    // What a person has left out himself, the line's own settings, is none of that.
+    let mut new = Bench::of(Family::ATV312, SetUp::ForTheBus);
+    let told = say(&mut new, &kept, &["--write"]).await.unwrap();
+    assert!(told.failure.is_none(), "{:?}", told.failure);
+    assert!(told.text.iter().any(|text| text.starts_with("not written: Add")), "{:?}", told.text);
+    assert_eq!(new.machine.peek(8_423), Some(1));
+}

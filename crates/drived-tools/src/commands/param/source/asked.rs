@@ -22,8 +22,8 @@ impl Source {
                 let path = path_of(&["drives", name, "parameters", &row.address.to_string()]);
                 let answer = daemon.get(&path).await;
                 let answer = answer.map_err(|failure| Unread::Silent(failure.to_string()))?;
-                let is_refused = answer.reason().as_deref() == Some("drive");
-                let failed = |failure: Failure| match is_refused {
+                let reason = answer.reason();
+                let failed = |failure: Failure| match is_of_the_register(reason.as_deref()) {
                     true => Unread::Refused(failure.to_string()),
                     false => Unread::Silent(failure.to_string()),
                 };
@@ -120,12 +120,18 @@ fn unwritten(row: &Row, error: &Error) -> Unwritten {
     }
 }
 
+/// Whether a register could not be read because the drive refuses this one. One that did not answer has another word.
+fn is_of_the_register(reason: Option<&str>) -> bool {
+    reason == Some("drive")
+}
+
 /// Whether the daemon refuses whatever is asked of this drive, now or of this caller, and not this register: its words for that.
 fn is_of_the_moment(reason: &str) -> bool {
-    const WHATEVER: [&str; 11] = [
+    const WHATEVER: [&str; 12] = [
         "read_only",
         "no_right",
         "offline",
+        "no_answer",
         "stale",
         "identity",
         "watchdog",
@@ -136,4 +142,32 @@ fn is_of_the_moment(reason: &str) -> bool {
         "shut_down",
     ];
     reason == Refusal::MotorRunning.word() || WHATEVER.contains(&reason)
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_core::{ExceptionMeaning, Exchange, PortError, SlaveAddress};
+    use drive_fleet::Refused;
+
+    use super::*;
+
+    #[test]
+    fn a_drive_that_has_fallen_silent_behind_the_daemon_is_not_taken_for_one_that_refuses_a_register() {
+        let slave = SlaveAddress::try_from(1).unwrap();
+        let exchange = Exchange { function: 3, register: None };
+        let silent = [
+            PortError::Timeout { after: std::time::Duration::from_millis(200) },
+            PortError::Expired,
+            PortError::Damaged("CRC"),
+            PortError::Closed,
+        ];
+        for problem in silent {
+            let refused = Refused::from(Error::Port { slave, exchange, problem });
+            assert!(!is_of_the_register(Some(refused.word())), "{refused}");
+            assert!(is_of_the_moment(refused.word()), "{refused}");
+        }
+        let meaning = ExceptionMeaning::NoSuchRegister;
+        let refused = Refused::from(Error::Exception { slave, exchange, code: 2, meaning });
+        assert!(is_of_the_register(Some(refused.word())) && !is_of_the_moment(refused.word()));
+    }
 }
