@@ -12,6 +12,7 @@ pub const OWN: &[&str] = &[
     "tokens",
     "audit",
     "watchdogs",
+    "profiles",
     "lines",
     "drives",
     "defaults",
