@@ -130,6 +130,29 @@ impl File {
         values.map(|(value, at)| Written { space, address: first.saturating_add(at), value }).collect()
     }
 
+    /// The word of a start that runs the motor. Of several words in its last step it is the one that [command] says, and of several of
+    /// these the one in the register that reads back: by it a drive tells this side's run command from another's.
+    pub(crate) fn run_word(&self, start: &Action) -> Option<u16> {
+        let written = self.written(start.steps.last()?.get_ref());
+        let read_back = self.read_back();
+        let mut runs = written.iter().filter(|written| self.runs(**written));
+        let reads_back = |of: &&Written| Some((of.space, of.address)) == read_back;
+        let found = runs.clone().find(reads_back).or_else(|| runs.next()).or_else(|| written.last());
+        found.map(|written| written.value)
+    }
+
+    /// Where the command reads back.
+    pub(crate) fn read_back(&self) -> Option<(Space, u16)> {
+        let read = self.ownership.reads_back.given()?;
+        self.place(self.named(read.get_ref().register.get_ref())?)
+    }
+
+    /// Where the run words of [command] are written.
+    pub(crate) fn commanded(&self) -> impl Iterator<Item = (Space, u16)> {
+        let runs = self.command.given().into_iter().flat_map(|command| &command.get_ref().runs);
+        runs.filter_map(|run| self.place(self.named(run.get_ref().register.get_ref())?))
+    }
+
     /// Every action with its name.
     pub(crate) fn actions(&self) -> impl Iterator<Item = (&'static str, &crate::format::Spanned<Action>)> {
         let all: [(&'static str, &Answer<_>); 8] = [

@@ -395,6 +395,63 @@ async fn the_three_that_motion_was_proved_for_say_the_truth_in_every_world_aroun
     }
 }
 
+/// The states of a stop that is done are those of a drive that does nothing: what it has refused there is no stop that it has taken.
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_is_refused_ends_no_lease_whatever_state_the_drive_shows() {
+    for trips in [false, true] {
+        let mut rig = misread("invt/goodrive", "goodrive", "address = 0x2000", "address = 0x2010");
+        rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+        rig.drive.start(Direction::Forward).await.expect_err("it is refused");
+        if trips {
+            rig.machine.trip(9);
+        }
+        let error = rig.drive.stop(StopMode::Ramp).await.expect_err("it is refused, each time");
+        assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
+        assert!(rig.drive.lease().is_some(), "the run command may stand");
+    }
+}
+
+/// It has tripped, and the one write of the stop gets an exception, or is lost: it is written until it is taken.
+#[tokio::test(start_paused = true)]
+async fn a_stop_of_a_drive_that_has_tripped_is_written_again_until_it_is_taken() {
+    for key in DRIVEN {
+        let mut rig = running(key).await;
+        rig.machine.trip(9);
+        rig.until("the trip", |status| status.state == State::Fault).await;
+        let before = rig.machine.received().len();
+        rig.machine.refuse_next(drive_sim::Exception::FAILURE);
+        let stopped = rig.drive.stop(StopMode::Ramp).await;
+        stopped.unwrap_or_else(|error| panic!("{key}: {error}"));
+        let written = rig.machine.received().iter().skip(before).filter(|request| !is_read(request)).count();
+        assert!(written >= 2 && rig.drive.lease().is_none(), "{key}: {written}");
+    }
+}
+
+/// Its last step writes the run word and then another: the lease is of the run word, which stands where it reads back.
+#[tokio::test(start_paused = true)]
+async fn the_lease_of_a_start_of_several_words_is_of_the_word_that_runs() {
+    let text = include_str!("data/split.toml")
+        .replace(
+            "{ write = \"DIRECTION\", words = [0] }, { write = \"RUN\", words = [1] }",
+            "{ write = \"RUN\", words = [1, 0] }",
+        )
+        .replace(
+            "{ write = \"DIRECTION\", words = [1] }, { write = \"RUN\", words = [1] }",
+            "{ write = \"RUN\", words = [1, 7] }",
+        );
+    let family = family_of(read(&text).unwrap_or_else(|refusals| panic!("{refusals}")));
+    let mut rig = contract(family, family.simulated_options()).rig();
+    rig.drive.status().await.expect("it answers");
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    for direction in [Direction::Forward, Direction::Reverse] {
+        rig.drive.start(direction).await.unwrap_or_else(|error| panic!("{direction}: {error}"));
+        assert_eq!(rig.drive.lease().map(|lease| lease.word), Some(1), "{direction}");
+        assert_eq!(rig.drive.run_word_for(direction), Some(1), "{direction}");
+        let status = rig.drive.status().await.expect("it answers");
+        assert!(!matches!(status.verdict, None | Some(Verdict::NotInForce { .. })), "{:?}", status.verdict);
+    }
+}
+
 /// The same drive, driven by a profile that has one place otherwise than the machine.
 fn misread(name: &str, key: &str, place: &str, by: &str) -> Rig {
     let text = text(name);

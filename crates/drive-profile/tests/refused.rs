@@ -218,6 +218,69 @@ fn a_ladder_that_runs_the_motor() {
     );
 }
 
+/// What a rung writes is a command like the steps of an action: here into another register than the command word.
+#[test]
+fn a_ladder_that_writes_what_no_command_may_write() {
+    const RUNG: &str = "register = \"CMD\", word = 0x0006";
+    refused(ALTIVAR, RUNG, "register = \"ETA\", word = 0x0006", "no word that can be written");
+    let register = |more: &str| {
+        let text = damaged(ALTIVAR, RUNG, "register = \"RUNG\", word = 0x0006");
+        text.replace("[register.CMD]\n", &format!("[register.RUNG]\nwhat = \"made\"\naddress = 12000\n{more}source = \"rule\"\n\n[register.CMD]\n"))
+    };
+    let never = "never_written = [{ from = 11999, to = 12001, why = \"it saves\", source = \"rule\" }]\n";
+    for (more, reason) in [
+        ("access = \"read_write\"\nstorage = \"eeprom\"\n", "wears an EEPROM"),
+        ("access = \"read_write\"\nstorage = \"ram\"\nparameter = true\n", "which is a parameter"),
+        ("access = \"read_write\"\nstorage = \"ram\"\nspace = \"coil\"\n", "no word that can be written"),
+        ("access = \"read_write\"\nstorage = \"ram\"\nbyte = \"low\"\n", "a part of what is written"),
+    ] {
+        let told = read(&register(more)).expect_err(reason).to_string();
+        assert!(told.contains("the ladder writes") || told.contains("the ladder has"), "{told}");
+        assert!(told.contains(reason), "{told}");
+    }
+    let text = register("access = \"read_write\"\nstorage = \"ram\"\n");
+    read(&text).expect("any other register is right");
+    let (head, tail) = text.split_once("never_written = ").expect("it says so");
+    let (_, tail) = tail.split_once('\n').expect("it is one line");
+    let told = read(&format!("{head}{never}{tail}")).expect_err("it saves").to_string();
+    assert!(told.contains("the ladder writes RUNG, which is never written"), "{told}");
+}
+
+/// A byte of the command word is the whole word when it is written.
+#[test]
+fn a_command_in_a_byte_of_a_word() {
+    let byte = "what = \"control word\"\nbyte = \"high\"";
+    refused(V20, "what = \"control word\"", byte, "stop.ramp has STW, which is a part of what is written");
+    refused(V20, "what = \"control word\"", byte, "[command] has STW, which is a part of what is written");
+    // By another name, while [command] has the whole word.
+    let text = damaged(V20, RAMP, "ramp = { steps = [{ write = \"LOW\", words = [0x047E] }]").replace(
+        "[register.HSW]\n",
+        "[register.LOW]\nwhat = \"made\"\naddress = 40100\nbyte = \"low\"\naccess = \"read_write\"\nstorage = \"ram\"\nsource = \"wb\"\n\n[register.HSW]\n",
+    );
+    assert!(read(&text).expect_err("a byte").to_string().contains("stop.ramp has LOW, which is a part"));
+}
+
+/// A block writes whatever lies in it.
+#[test]
+fn a_block_that_passes_over_what_is_never_written_or_only_read() {
+    let ramp = "ramp = { steps = [{ write = \"STW\", words = [0x047E, 0] }]";
+    let text = damaged(V20, RAMP, ramp).replace("write_words = 1\n", "write_words = 4\n");
+    let never = text.replace("{ from = 40004, to = 40007", "{ from = 40101, to = 40107");
+    let told = read(&never).expect_err("it is never written").to_string();
+    assert!(told.contains("stop.ramp writes STW, or beyond it, which is never written"), "{told}");
+    let (head, tail) = text.split_once("address = 40101\naccess = \"read_write\"\n").expect("HSW");
+    let told = read(&format!("{head}address = 40101\naccess = \"read\"\n{tail}"))
+        .expect_err("it is read")
+        .to_string();
+    assert!(told.contains("stop.ramp writes 0064h, which can only be read"), "{told}");
+    let worn = format!(
+        "{head}address = 40101\naccess = \"read_write\"\n{}",
+        tail.replacen("storage = \"ram\"", "storage = \"eeprom\"", 1)
+    );
+    let told = read(&worn).expect_err("it wears").to_string();
+    assert!(told.contains("stop.ramp writes 0064h, which wears an EEPROM"), "{told}");
+}
+
 #[test]
 fn a_scale_that_cannot_be_turned_round() {
     for scale in ["[0, 10]", "[1, 0]", "[-1, 10]"] {

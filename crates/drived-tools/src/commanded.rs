@@ -40,6 +40,8 @@ pub struct Commanded {
     config: LineConfig,
     line: Line,
     ending: Ending,
+    /// Whether it was to start the motor: its stop is not given up before it is taken, or its time is over.
+    has_started: bool,
     /// Nobody is told on stdout how it goes, because that is for an object.
     pub is_quiet: bool,
 }
@@ -53,7 +55,8 @@ impl Commanded {
         options: &Options,
         accepted: Vec<String>,
     ) -> Result<Self, Failure> {
-        let ending = Ending::listen()?;
+        // A terminal that is gone asks as Ctrl-C does: a motor that was started is stopped before the program ends.
+        let ending = Ending::listen_on_terminal()?;
         let settings = DriveSettings {
             accept_self_restart: accepted,
             periods: Periods { running: PERIOD, rest: PERIOD, slow: Duration::ZERO, ..Periods::default() },
@@ -74,7 +77,16 @@ impl Commanded {
             .start()
             .map_err(|error| input(&error))?;
         let Some(handle) = fleet.drives().pop() else { return Err(input(&"the fleet has no drive")) };
-        Ok(Self { name, handle, events: fleet.events(), config, line, ending, is_quiet: false })
+        Ok(Self {
+            name,
+            handle,
+            events: fleet.events(),
+            config,
+            line,
+            ending,
+            has_started: false,
+            is_quiet: false,
+        })
     }
 
     /// What is known of the drive now.
@@ -98,6 +110,7 @@ impl Commanded {
         command: impl AsyncFn(DriveHandle) -> Outcome,
     ) -> Result<(Started, Status), Failure> {
         self.connected().await?;
+        self.has_started = true;
         let outcome = tokio::select! {
             biased;
             outcome = undisturbed(&self.handle, command) => Some(outcome),
@@ -118,20 +131,27 @@ impl Commanded {
         )))
     }
 
+    /// Waits until the program is asked to end, for whoever waits for something else beside it while the motor runs. Safe to drop.
+    pub async fn asked_to_end(&mut self) {
+        self.ending.asked().await;
+    }
+
     /// Stops the motor and tells how that goes. Gives how it was stopped, and the status at standstill.
     ///
-    /// A verdict comes in its time, whatever line and port do.
+    /// A verdict comes in its time, whatever line and port do. Whoever asks the program to end gives up the stop of a motor that
+    /// somebody else has started, and not that of one that was started here: whatever was asked before, this stop is its answer.
     pub async fn stop(&mut self, order: impl Into<StopOrder>) -> Result<(StopModes, Status), Failure> {
         let name = self.name;
         let stop = self.handle.stop(order);
         let mut watch = self.handle.watch();
         let mut seconds = interval_at(Instant::now() + SECOND, SECOND);
         let (mut waited, mut taken) = (0, false);
+        while self.has_started && timeout(Duration::ZERO, self.ending.asked()).await.is_ok() {}
         let outcome = loop {
             tokio::select! {
                 biased;
                 outcome = stop.finished() => break outcome,
-                () = self.ending.asked() => {
+                () = self.ending.asked(), if taken || !self.has_started => {
                     return Err(Failure::Drive(match taken {
                         true => format!(
                             "{name}: asked to end while the motor came to its stop: the drive showed {}", self.status()
@@ -302,6 +322,44 @@ mod tests {
                 );
             }
             assert!(taken_back > 0, "{family}");
+        }
+    }
+
+    /// Ctrl-C while the motor runs, once and again: the stop that answers it is sent and waited for.
+    #[tokio::test(start_paused = true)]
+    async fn the_stop_of_a_motor_that_was_started_here_is_waited_for_whatever_was_asked() {
+        let family = Family::BUILT_IN[0];
+        for line_is_lost in [false, true] {
+            let settings: SerialSettings = family.capabilities().factory;
+            let simulated = SimLine::new(Wiring::rtu(settings));
+            let machine =
+                simulated.add_boxed(1, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap();
+            let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
+            let line = Line::over(simulated.in_memory(), config.clone());
+            let name = DriveName { family, slave: SlaveAddress::try_from(1).unwrap() };
+            let mut one = Commanded::over(name, line, config, &simulated::options(), Vec::new()).unwrap();
+            let setpoint = Frequency::from_hertz(20);
+            let held = one.command(async |drive| drive.set_setpoint(setpoint).await).await.unwrap();
+            assert!(held.is_confirmed(), "{held}");
+            one.start(async |drive| drive.start(Direction::Forward).await).await.unwrap();
+            one.ending.at(Instant::now() + SECOND);
+            one.asked_to_end().await;
+            // Before the stop is begun, or while it is not taken.
+            one.ending.at(Instant::now() + if line_is_lost { SECOND } else { Duration::ZERO });
+            if line_is_lost {
+                machine.mute();
+                let back = machine.clone();
+                tokio::spawn(async move {
+                    sleep(2 * SECOND).await;
+                    back.unmute();
+                });
+            }
+            let stopped = one.stop(StopMode::Ramp).await;
+            let told = stopped.map_or_else(|failure| failure.to_string(), |_| String::new());
+            assert!(!told.contains(UNCONFIRMED), "{told}");
+            assert!(line_is_lost || told.is_empty(), "{told}");
+            sleep(Duration::from_secs(10)).await;
+            assert!(!machine.observe().running);
         }
     }
 

@@ -4,7 +4,7 @@ use crate::format::Spanned;
 
 use super::Check;
 use crate::{
-    format::{Action, File, Step},
+    format::{Access, Action, File, Register, Step, Storage},
     profile::Written,
 };
 
@@ -21,7 +21,9 @@ impl Check<'_> {
             self.source(&command.get_ref().source);
             for run in &command.get_ref().runs {
                 // A register that is a command when written may be another thing when read.
-                self.register(&run.get_ref().register);
+                if let Some(register) = self.register(&run.get_ref().register) {
+                    self.is_whole("[command]", &run.get_ref().register, register);
+                }
                 self.source(&run.get_ref().source);
                 self.mask(run.get_ref());
             }
@@ -122,14 +124,17 @@ impl Check<'_> {
                 "parameter = false: a command is no parameter",
             );
         }
-        if let Some(why) = self.forbidden(register) {
+        self.is_whole(name, to, register);
+        // A block writes whatever lies in it.
+        if let Some(why) = self.forbidden(register).or_else(|| self.forbidden_block(register, count)) {
             self.refuse(
                 &spanned.span(),
-                format!("{name} writes {}, which is never written: {why}", to.get_ref()),
+                format!("{name} writes {}, or beyond it, which is never written: {why}", to.get_ref()),
                 "another register, or take it out of never_written",
             );
         }
-        if register.access == crate::format::Access::Read {
+        self.passed_over(name, spanned);
+        if register.access == Access::Read {
             self.refuse(
                 &spanned.span(),
                 format!("{} can only be read", to.get_ref()),
@@ -138,6 +143,43 @@ impl Check<'_> {
         }
         if name != "setup" {
             self.is_volatile(name, to, register);
+        }
+    }
+
+    /// What a step writes behind its first register can be written as that one can.
+    fn passed_over(&mut self, name: &str, spanned: &Spanned<Step>) {
+        let file = self.file;
+        for written in file.written(spanned.get_ref()).into_iter().skip(1) {
+            let at =
+                |of: &&Spanned<Register>| file.place(of.get_ref()) == Some((written.space, written.address));
+            for register in file.register.values().filter(at).map(Spanned::get_ref) {
+                if register.access == Access::Read {
+                    self.refuse(
+                        &spanned.span(),
+                        format!("{name} writes {:04X}h, which can only be read", written.address),
+                        "a block that ends before it",
+                    );
+                }
+                let wears = |storage: &Spanned<Storage>| *storage.get_ref() == Storage::Eeprom;
+                if name != "setup" && register.storage.as_ref().is_some_and(wears) {
+                    self.refuse(
+                        &spanned.span(),
+                        format!("{name} writes {:04X}h, which wears an EEPROM", written.address),
+                        "a block that ends before it",
+                    );
+                }
+            }
+        }
+    }
+
+    /// A command is one whole word: a run bit in the byte or the word that is not looked at is one that nobody finds.
+    pub(super) fn is_whole(&mut self, what: &str, name: &Spanned<String>, register: &Register) {
+        if register.byte.is_some() || what == "[command]" && register.words.is_some() {
+            self.refuse(
+                &name.span(),
+                format!("{what} has {}, which is a part of what is written", name.get_ref()),
+                "a register that is the whole word, without `byte` and `words`",
+            );
         }
     }
 
@@ -229,13 +271,15 @@ impl Check<'_> {
     /// What makes guards true is a setting. A command among them stops or starts a motor that somebody else drives.
     fn setup(&mut self) {
         let Some(setup) = self.file.setup.given() else { return };
-        let commands: Vec<_> =
-            self.file.command.given().into_iter().flat_map(|of| &of.get_ref().runs).collect();
-        let is_command = |name: &Spanned<String>| {
-            commands.iter().any(|run| run.get_ref().register.get_ref() == name.get_ref())
+        let file = self.file;
+        // By its place, and not by its name: a block has no name for what lies behind its first register.
+        let is_command = |step: &Step| {
+            let places = file.written(step).into_iter().map(|written| (written.space, written.address));
+            places.into_iter().any(|place| file.commanded().any(|command| command == place))
         };
-        let written = setup.get_ref().steps.iter().filter_map(|step| step.get_ref().write.as_ref());
-        if let Some(name) = written.into_iter().find(|name| is_command(name)) {
+        let steps = setup.get_ref().steps.iter().map(Spanned::get_ref);
+        let commands = steps.into_iter().find(|step| is_command(step));
+        if let Some(name) = commands.and_then(|step| step.write.as_ref()) {
             self.refuse(
                 &name.span(),
                 format!("setup writes {}, which commands the motor", name.get_ref()),

@@ -120,11 +120,20 @@ impl Check<'_> {
         }
     }
 
-    /// Why a register is never written, where it is not.
+    /// Why a register is never written, where it is not: also by its second word.
     pub(super) fn forbidden(&self, register: &Register) -> Option<String> {
-        let number = *register.address.get_ref();
+        self.forbidden_block(
+            register,
+            usize::from(register.words.as_ref().map_or(1, |words| *words.get_ref())),
+        )
+    }
+
+    /// Why so many registers from this one on are never written, where one of them is not.
+    pub(super) fn forbidden_block(&self, register: &Register, count: usize) -> Option<String> {
+        let first = *register.address.get_ref();
+        let last = first.saturating_add(u32::try_from(count.saturating_sub(1)).unwrap_or(u32::MAX));
         let all = self.file.never_written.given()?;
-        let found = all.iter().find(|of| (*of.get_ref().from.get_ref()..=of.get_ref().to).contains(&number));
+        let found = all.iter().find(|of| *of.get_ref().from.get_ref() <= last && first <= of.get_ref().to);
         found.map(|of| of.get_ref().why.clone())
     }
 

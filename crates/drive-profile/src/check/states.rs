@@ -1,7 +1,7 @@
 //! States: none that covers another, none that hides a trip, and none that nobody can leave.
 
 use super::Check;
-use crate::format::{Bits, Deed, StateIs, StateName};
+use crate::format::{Access, Bits, Deed, Register, Space, Spanned, StateIs, StateName};
 
 /// Whether a word can fit both.
 fn overlap(one: &StateIs, other: &StateIs) -> bool {
@@ -62,6 +62,34 @@ impl Check<'_> {
         self.ladder();
     }
 
+    /// What a rung writes is a command, and so what an action may write: one word, in RAM, that is not kept from being written.
+    fn rung(&mut self, name: &Spanned<String>, register: &Register) {
+        let is_holding = self.file.place(register).is_some_and(|(space, _)| space == Space::HoldingRegister);
+        if !is_holding || register.words.is_some() || register.access == Access::Read {
+            self.refuse(
+                &name.span(),
+                format!("the ladder writes {}, which is no word that can be written", name.get_ref()),
+                "a holding register of one word with access = \"read_write\"",
+            );
+        }
+        if register.parameter {
+            self.refuse(
+                &name.span(),
+                format!("the ladder writes {}, which is a parameter", name.get_ref()),
+                "parameter = false: a command is no parameter",
+            );
+        }
+        if let Some(why) = self.forbidden(register) {
+            self.refuse(
+                &name.span(),
+                format!("the ladder writes {}, which is never written: {why}", name.get_ref()),
+                "another register, or take it out of never_written",
+            );
+        }
+        self.is_whole("the ladder", name, register);
+        self.is_volatile("the ladder", name, register);
+    }
+
     /// From each rung something leads on, and one leads to the run command.
     fn ladder(&mut self) {
         let Some(rungs) = self.file.start.ladder.given() else { return };
@@ -79,6 +107,9 @@ impl Check<'_> {
             }
             if let (Some(register), Some(word)) = (&rung.register, rung.word) {
                 let found = self.register(register);
+                if let Some(found) = found {
+                    self.rung(register, found);
+                }
                 let place = found.and_then(|register| self.file.place(register));
                 if let Some((space, address)) = place
                     && self.file.runs(crate::profile::Written { space, address, value: word })

@@ -29,6 +29,10 @@ const NOT_ALONE: Refusal = Refusal::Settings(
      it, and say so by commands-alone = yes",
 );
 
+/// How far an output has to fall to be on its way down: more than the few counts by which that of many drives flickers. A ramp that
+/// falls less in the time that a command has to show (200 s from 50 Hz) is seen by its end, and not by its beginning.
+const FALL: Frequency = Frequency::from_centihertz(50);
+
 /// The most rungs of a ladder that are climbed for one start.
 const RUNGS: usize = 8;
 
@@ -61,7 +65,7 @@ impl<P: Port> ProfileDrive<P> {
         for step in before {
             self.step(step.get_ref(), Class::Command, order).await?;
         }
-        let word = profile.file().written(last.get_ref()).last().map_or(0, |written| written.value);
+        let word = profile.file().run_word(action).unwrap_or(0);
         self.watch.run.give(Lease::new(direction, word));
         self.comes_down = None;
         let sent = self.step(last.get_ref(), Class::Command, order).await;
@@ -129,7 +133,7 @@ impl<P: Port> ProfileDrive<P> {
                 (self.agreed.is_some() && seen.is_some() && self.agreed != seen).then_some(OTHER_REFERENCE);
             let because = local.or_else(|| withheld(&status)).or(other);
             let output = status.output_frequency;
-            let slows = output.is_some() && output < first;
+            let slows = output.is_some_and(|output| has_fallen(output, first));
             if because.is_none() && (status.direction == Some(direction) || !tells_direction || slows) {
                 self.agreed = self.setpoint_seen(&words);
                 let verdict = self.watch.run.verdict(&self.evidence(&status, &words));
@@ -157,8 +161,9 @@ impl<P: Port> ProfileDrive<P> {
             return Err(Error::Unsupported { what: "a stop", reason: "its profile has none" });
         };
         let order = Order::Stop(asked);
-        // What became of it, the reading tells.
-        self.write_stop(action, order).await?.ok();
+        // What the drive shows is no proof of a stop that it has refused or never got: behind a trip, or a state in which no motor turns,
+        // the run command may stand and act when that goes away.
+        let mut written = self.write_stop(action, order).await?;
         self.registers.owe_judgement();
         self.watch.shaft.stops();
         let mut confirming = Confirming::begin();
@@ -176,7 +181,7 @@ impl<P: Port> ProfileDrive<P> {
                 .flat_map(crate::format::Spanned::get_ref)
                 .any(|state| state.state() == status.state);
             let falls = comes_down(&status, first);
-            if seen || falls {
+            if written.is_ok() && (seen || falls) {
                 if falls && status.state == State::Running {
                     status.state = State::Stopping;
                     self.comes_down = status.output_frequency.map(Frequency::centihertz);
@@ -187,10 +192,11 @@ impl<P: Port> ProfileDrive<P> {
             }
             first = first.or(status.output_frequency);
             if Instant::now() >= again {
-                self.write_stop(action, order).await.map_err(Error::after_write)?.ok();
+                written = self.write_stop(action, order).await.map_err(Error::after_write)?;
                 again = Instant::now() + SETTLED_WITHIN;
             }
             if !confirming.again().await {
+                written.map_err(Error::after_write)?;
                 let because = (status.control == Some(Control::Local)).then_some(OTHERS);
                 return Err(self.not_confirmed(order, status, because));
             }
@@ -213,7 +219,7 @@ impl<P: Port> ProfileDrive<P> {
         (instead, Some("its profile has no such stop"))
     }
 
-    /// That the drive refuses it, or that nobody knows whether it arrived, is given back: what the drive shows tells more.
+    /// That the drive refuses it, or that nobody knows whether it arrived, is given back: it is written again.
     async fn write_stop(&mut self, action: &Action, order: Order) -> Result<Result<()>> {
         let Some(step) = action.steps.first() else { return Ok(Ok(())) };
         match self.step(step.get_ref(), Class::Stop, order).await {
@@ -329,7 +335,10 @@ impl<P: Port> ProfileDrive<P> {
 
     async fn write(&mut self, step: &Step, writes: &[Written], class: Class, order: Order) -> Result<()> {
         let Some(&Written { space, address, value }) = writes.first() else { return Ok(()) };
-        self.watch.run.sends(value);
+        // Of several words the one that reads back is held against what is read.
+        let read_back = self.profile.file().read_back();
+        let reads_back = |written: &&Written| Some((written.space, written.address)) == read_back;
+        self.watch.run.sends(writes.iter().find(reads_back).map_or(value, |written| written.value));
         let is_edge = order == Order::ResetFaults;
         let mut calls = self.registers.at(class);
         if is_edge {
@@ -378,8 +387,15 @@ const fn withheld_by(deed: Deed) -> Option<Refusal> {
 /// Whether the output goes down below what it is to be, since the first look. One that only follows a lower setpoint ends there.
 fn comes_down(status: &Status, first: Option<Frequency>) -> bool {
     let Some(output) = status.output_frequency else { return false };
-    let below = status.reference.is_none_or(|reference| output < reference);
-    below && first.is_some_and(|first| output < first) && status.state == State::Running
+    let below = status.reference.is_none_or(|reference| has_fallen(output, Some(reference)));
+    below && has_fallen(output, first) && status.state == State::Running
+}
+
+/// Whether an output is so far below another that it is no flicker of its register.
+fn has_fallen(output: Frequency, from: Option<Frequency>) -> bool {
+    from.is_some_and(|from| {
+        output.centihertz().checked_add(FALL.centihertz()).is_some_and(|least| least <= from.centihertz())
+    })
 }
 
 #[cfg(test)]
@@ -399,5 +415,17 @@ mod tests {
         assert!(comes_down(&shown(19, hertz(20)), hertz(40)));
         assert!(!comes_down(&shown(40, hertz(50)), hertz(40)), "it holds its speed");
         assert!(!comes_down(&shown(39, hertz(50)), None), "one look tells nothing");
+    }
+
+    #[test]
+    fn an_output_that_flickers_by_a_count_is_no_stop() {
+        let first = Some(Frequency::from_hertz(40));
+        for (output, falls) in [(3_999, false), (3_990, false), (3_951, false), (3_950, true)] {
+            let output = Frequency::from_centihertz(output);
+            let status =
+                Status { state: State::Running, output_frequency: Some(output), ..Status::default() };
+            assert_eq!(comes_down(&status, first), falls, "{output}");
+            assert_eq!(has_fallen(output, first), falls, "{output}");
+        }
     }
 }

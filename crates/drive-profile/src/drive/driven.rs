@@ -19,7 +19,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
             Direction::Forward => &file.start.forward,
             Direction::Reverse => &file.start.reverse,
         };
-        Some(file.writes(start.given()?.get_ref()).last()?.value)
+        file.run_word(start.given()?.get_ref())
     }
 
     fn adopt(&mut self, lease: Lease) {

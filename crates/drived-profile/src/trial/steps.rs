@@ -10,9 +10,9 @@ use tokio::time::{Instant, sleep};
 
 use drived_client::own_line::{open_drive, wait_at_most, words};
 use drived_tools::commanded::Commanded;
-use drived_words::{drive_spec::DriveName, failure::Failure};
+use drived_words::{drive_spec::DriveName, failure::Failure, signals::Ending};
 
-use super::console::Console;
+use super::console::{Console, asked_to_end};
 
 /// How long a person has until what he does at the panel shows.
 const AT_THE_PANEL: Duration = Duration::from_secs(60);
@@ -42,6 +42,8 @@ impl Steps {
         if !stops {
             return console.say("the profile knows no stop: the trial ends here, with what was read");
         }
+        // What listens to Ctrl-C while the drive is commanded ends its being the end of the program: so each question hears it from here.
+        console.hear(Ending::listen_on_terminal()?);
         seen.push(self.test_the_stop(console).await?);
         seen.extend(self.start_slowly(console).await?);
         Ok(())
@@ -146,9 +148,15 @@ impl Steps {
                 return Err(failure);
             }
         };
-        console.say(format_args!("{started}: the drive shows {status}"))?;
-        let turns = console.agrees("Does the motor turn slowly, forward?").await;
+        // The motor runs by this program: nothing leads from here but by the stop, neither a terminal that is gone nor Ctrl-C.
+        let said = console.say(format_args!("{started}: the drive shows {status}"));
+        let turns = tokio::select! {
+            biased;
+            () = one.asked_to_end() => Err(asked_to_end()),
+            turns = console.agrees("Does the motor turn slowly, forward?") => turns,
+        };
         let (_, stopped) = one.stop(StopMode::Ramp).await?;
+        said?;
         console.say(format_args!("stopped: the drive shows {stopped}"))?;
         if !turns? {
             return Err(not_right());

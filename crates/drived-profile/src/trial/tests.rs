@@ -5,7 +5,11 @@ use drive_core::{SerialSettings, serial::CharacterFormat};
 use drive_families::{SetUp, simulated};
 use drive_profile::read;
 use drive_sim::{Panel, SimLine, SimSlave, Wiring};
-use tokio::io::{AsyncWriteExt as _, BufReader, DuplexStream, duplex};
+use drived_words::signals::Ending;
+use tokio::{
+    io::{AsyncWriteExt as _, BufReader, DuplexStream, duplex},
+    time::{Instant, sleep},
+};
 
 use super::*;
 
@@ -64,6 +68,34 @@ async fn a_person_climbs_with_the_drive_and_what_was_seen_is_noted() {
     assert_eq!(seen.len(), 4, "{seen:#?}");
     assert!(seen[3].contains("5.00 Hz"), "{seen:#?}");
     assert!(!machine.observe().running);
+}
+
+/// The person types the drive's name, and then presses Ctrl-C instead of an answer: the motor runs, and nobody stands by it any more.
+#[tokio::test(start_paused = true)]
+async fn a_person_who_asks_to_end_while_the_motor_runs_leaves_it_stopped() {
+    let (steps, machine) = steps(("", ""));
+    let (answers, asked) = duplex(4_096);
+    let of = machine.clone();
+    let (runs, mut ran) = tokio::sync::oneshot::channel();
+    let person = tokio::spawn(async move {
+        // All but the answers after the start, which do not come.
+        let answers = person(answers, of.clone(), "v20 ").await;
+        of.wait_until(|seen| seen.running).await;
+        runs.send(()).expect("it is waited for");
+        std::future::pending::<()>().await;
+        drop(answers);
+    });
+    let mut console = Console::reading(BufReader::new(asked));
+    let mut ending = Ending::listen().expect("it listens");
+    ending.at(Instant::now() + std::time::Duration::from_secs(300));
+    console.hear(ending);
+    let mut seen = Vec::new();
+    let failed = steps.climb(&mut console, &mut seen).await;
+    person.abort();
+    let failure = failed.expect_err("the trial ends").to_string();
+    assert!(failure.contains("asked to end") && seen.len() == 3, "{failure}: {seen:#?}");
+    sleep(std::time::Duration::from_secs(5)).await;
+    assert!(ran.try_recv().is_ok() && !machine.observe().running);
 }
 
 #[tokio::test(start_paused = true)]
