@@ -13,6 +13,7 @@ const SHOWS: &[&str] = &[
     "drived-line-tools/src/poll/json.rs",
     "drived-broker/src/mqtt/discovery/drive.rs",
     "drived-gateway/src/virtual_unit.rs",
+    "drived-history/src/quantity.rs",
     "drived-http/src/metrics/drives.rs",
     "drived-plant/src/journal/words.rs",
     "drived-screen/src/row/mod.rs",
