@@ -1,4 +1,4 @@
-//! The values of one quantity as bytes: [`Column`], times and counts by their differences, in a zlib stream.
+//! The values of one quantity as bytes ([`pack`]), times and counts by their differences, in a zlib stream.
 //!
 //! Anybody can read it: `zlib.decompress`, then pairs of LEB128 numbers, each zigzag: by how many milliseconds the step to
 //! the next time differs from the step before, and by how much the count differs from the one before. A count that is not known is

@@ -1,6 +1,6 @@
 //! The black box of a plant: what the daemon knows, kept for years in one SQLite file, and asked.
 //!
-//! The [writing half](write) is fed by the fleet's snapshots and by the event stream, through an [inbox](write::inbox) that takes or refuses
+//! The [writing half](mod@write) is fed by the fleet's snapshots and by the event stream, through an [inbox](write::inbox) that takes or refuses
 //! at once: no line, no stop and no answer waits for a disk. The [reading half](read) opens the file beside a daemon that writes it, or
 //! without one.
 
