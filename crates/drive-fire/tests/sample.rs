@@ -45,18 +45,11 @@ fn fuzzing_finds_what_is_planted() {
 /// With `--features plants`: most of the wrong lines are found; which live is printed.
 #[cfg(feature = "plants")]
 mod planted {
-    use super::{matrix, model};
+    use super::model;
 
     #[test]
     fn the_model_finds_what_is_planted() {
         let told = model::find_plants(3);
-        println!("{told}");
-        assert!(told.plants_found() >= 10, "{told}");
-    }
-
-    #[test]
-    fn the_matrix_finds_what_is_planted() {
-        let told = matrix::find_plants(1, 250);
         println!("{told}");
         assert!(told.plants_found() >= 10, "{told}");
     }

@@ -395,7 +395,7 @@ def long_group(page, url):
     expect(account.locator("[data-count=confirmed]")).to_have_text("2")
     expect(account.locator("[data-count=pending]")).to_have_text("0")
     expect(account.locator("[data-count=refused]")).to_have_text("1")
-    expect(account.locator(".head")).to_have_text(re.compile("^Taken by the daemon at [0-9:]+ [^ ]+ for 2 drives$"))
+    expect(account.locator(".head")).to_have_text(re.compile(r"^Taken by the daemon at [0-9:]+\s\S+ for 2 drives$"))
     expect(account.locator(".left")).to_have_text("only read, not stopped: pump 3")
 
 
