@@ -326,7 +326,7 @@ impl<P: Port> Calls<'_, P> {
     /// What a register holds after a write of which nobody knows what became: read once, or for a while where the drive
     /// has said that it takes long.
     async fn read_back(&mut self, address: u16, value: u16, error: &Error) -> Result<u16> {
-        let takes_long = matches!(error, Error::Exception { .. });
+        let takes_long = matches!(error, Error::Exception { meaning: ExceptionMeaning::Accepted, .. });
         // The write has gone: whoever reads it back does not die of the order's lifetime.
         self.terms.lifetime = None;
         let mut confirming = Confirming::within(PATIENCE);

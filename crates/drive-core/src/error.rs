@@ -25,9 +25,10 @@ pub struct Exchange {
 }
 
 impl Exchange {
-    /// Whether it writes registers.
-    const fn is_write(self) -> bool {
-        matches!(self.function, 0x06 | 0x10)
+    /// Whether it writes registers or coils.
+    #[must_use]
+    pub const fn is_write(self) -> bool {
+        matches!(self.function, 0x05 | 0x06 | 0x0F | 0x10 | 0x16 | 0x17)
     }
 }
 
@@ -45,9 +46,7 @@ impl fmt::Display for Exchange {
     }
 }
 
-/// Acknowledge: the slave has accepted the request and takes long for it (Modbus Application Protocol V1.1b3, section 7).
-const ACCEPTED: u8 = 5;
-/// Server device busy: the slave has done nothing, and wants to be asked again (the same section).
+/// Server device busy: the slave has done nothing, and wants to be asked again (Modbus Application Protocol V1.1b3, section 7).
 pub(crate) const BUSY: u8 = 6;
 
 /// What an exception means on a drive of this family, and so what to do about it.
@@ -82,10 +81,21 @@ impl ExceptionMeaning {
             2 => Self::NoSuchRegister,
             3 => Self::ValueRefused,
             4 => Self::Failed,
-            ACCEPTED => Self::Accepted,
+            5 => Self::Accepted,
             BUSY => Self::Busy,
             _ => Self::Unknown,
         }
+    }
+
+    /// Whether it says of a write that nothing was done by it. "Began and could not complete" (04h), "takes long" (05h), a
+    /// gateway's "heard no answer" (0Bh) and a code of which the manual says nothing leave that open: the write may have been
+    /// carried out, and a run word may turn the motor.
+    #[must_use]
+    pub const fn denies(self) -> bool {
+        matches!(
+            self,
+            Self::NoSuchFunction | Self::NoSuchRegister | Self::ValueRefused | Self::NotNow | Self::Busy
+        )
     }
 
     /// Whether the same request may succeed later without anybody changing anything.
@@ -319,7 +329,7 @@ pub enum ErrorKind {
     OutcomeUnknown,
     /// Nothing was sent: expired, superseded, off-line, queue full, line down.
     NotSent,
-    /// The drive answered that it will not.
+    /// The drive answered that it will not, and has not.
     Exception,
     /// The drive's answer breaks its manual.
     Answer,
@@ -360,7 +370,7 @@ impl Error {
             Self::Port { problem: PortError::OutcomeUnknown(_), .. } => ErrorKind::OutcomeUnknown,
             Self::Port { problem, .. } if problem.nothing_sent() => ErrorKind::NotSent,
             Self::Port { .. } => ErrorKind::NoAnswer,
-            Self::Exception { code: ACCEPTED, exchange, .. } if exchange.is_write() => {
+            Self::Exception { meaning, exchange, .. } if exchange.is_write() && !meaning.denies() => {
                 ErrorKind::OutcomeUnknown
             }
             Self::Exception { .. } => ErrorKind::Exception,
@@ -401,6 +411,23 @@ mod tests {
             Error::Answer { slave, exchange, reason: "the answer is of another function" },
         ] {
             assert_eq!(error.after_write().kind(), ErrorKind::OutcomeUnknown);
+        }
+    }
+
+    /// Modbus Application Protocol V1.1b3, section 7: 04 "while the server was attempting to perform", 0B "no response was
+    /// obtained from the target device".
+    #[test]
+    fn an_exception_that_does_not_deny_leaves_the_outcome_of_a_write_open() {
+        let slave = SlaveAddress::try_from(7).unwrap();
+        let kind = |function, code| {
+            let exchange = Exchange { function, register: Some(8501) };
+            Error::Exception { slave, exchange, code, meaning: ExceptionMeaning::standard(code) }.kind()
+        };
+        for code in 0x01..=0x0B {
+            let open = matches!(code, 0x04 | 0x05 | 0x07..=0x0B);
+            let of_a_write = if open { ErrorKind::OutcomeUnknown } else { ErrorKind::Exception };
+            assert_eq!((kind(6, code), kind(16, code)), (of_a_write, of_a_write), "{code:02X}h");
+            assert_eq!(kind(3, code), ErrorKind::Exception, "{code:02X}h");
         }
     }
 

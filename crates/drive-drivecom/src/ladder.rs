@@ -8,18 +8,13 @@ use super::{
     words::{ControlWord, RunShown},
 };
 use drive_core::{
-    Class, Command, Confirming, Control, Direction, Effect, Error, ErrorKind, Frequency, Lease, OwnRun,
-    Refusal, Result, SlaveAddress, State, Status, StopMode, Stopped, Withdrawn,
+    Class, Command, Confirming, Control, Direction, Effect, Error, ErrorKind, ExceptionMeaning, Frequency,
+    Lease, OwnRun, Refusal, Result, SlaveAddress, State, Status, StopMode, Stopped, Withdrawn,
 };
 
 /// After how many readings that do not show a stop it is written again: half a second apart, once the readings have found
 /// their longest pause.
 const READS_PER_STOP: usize = 5;
-
-/// Exception 05: the drive has taken the request and will be long over it.
-const ACKNOWLEDGED: u8 = 0x05;
-/// Exception 06: the drive is busy and has not taken it.
-const BUSY: u8 = 0x06;
 
 /// What is written to stop, and how the motor is stopped by it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -178,12 +173,11 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
                     drive.owes_judgement();
                 }
                 match written {
-                    Err(error) if exception(&error) == Some(BUSY) => {
+                    Err(error) if means(&error, ExceptionMeaning::Busy) => {
                         climb.forget_written();
                         true
                     }
-                    Err(error) if leaves_open(&error) => return Err(error.after_write()),
-                    Err(error) if exception(&error) != Some(ACKNOWLEDGED) => return Err(error),
+                    Err(error) if !means(&error, ExceptionMeaning::Accepted) => return Err(error),
                     _ => {
                         confirming = Confirming::begin();
                         false
@@ -220,7 +214,9 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
 fn keep_lease(own: &mut OwnRun, written: &Result<()>) {
     match written {
         Ok(()) => own.was_written(),
-        Err(error) if is_denied(error) || error.kind() == ErrorKind::NotSent => own.was_not_written(),
+        Err(error) if matches!(error.kind(), ErrorKind::Exception | ErrorKind::NotSent) => {
+            own.was_not_written()
+        }
         Err(_) => {}
     }
 }
@@ -303,7 +299,7 @@ pub async fn stop<D: Drivecom>(drive: &mut D, mode: StopMode) -> Result<Stopped>
 /// it from being sent ends the stop.
 async fn write_stop<D: Drivecom>(drive: &mut D, stop: &StopWord) -> Result<Result<()>> {
     match drive.write_control(Class::Stop, stop.word, Effect::Level).await {
-        Err(error) if exception(&error) == Some(ACKNOWLEDGED) => Ok(Ok(())),
+        Err(error) if means(&error, ExceptionMeaning::Accepted) => Ok(Ok(())),
         Err(error) if error.kind() == ErrorKind::NotSent => Err(error),
         written => Ok(written),
     }
@@ -372,8 +368,6 @@ pub async fn reset_fault<D: Drivecom>(drive: &mut D) -> Result<Status> {
     // An edge that may have arrived is cleared as well, so that the next one rises; the status tells the outcome.
     if let Err(error) = edge
         && error.kind() != ErrorKind::OutcomeUnknown
-        && exception(&error) != Some(ACKNOWLEDGED)
-        && !leaves_open(&error)
     {
         return Err(error);
     }
@@ -405,22 +399,8 @@ const fn tripped(status: &Status) -> Refusal {
     }
 }
 
-/// Whether an exception says that nothing was done by a write: function, address or value are not the drive's, or it was busy.
-fn is_denied(error: &Error) -> bool {
-    exception(error).is_some_and(|code| matches!(code, 0x01..=0x03 | BUSY))
-}
-
-/// Whether an exception leaves open what a write has done: 04h is printed as "started but cannot complete", and a gateway's 0Bh says
-/// only that it has heard no answer.
-fn leaves_open(error: &Error) -> bool {
-    exception(error).is_some_and(|code| code != ACKNOWLEDGED) && !is_denied(error)
-}
-
-const fn exception(error: &Error) -> Option<u8> {
-    match error {
-        Error::Exception { code, .. } => Some(*code),
-        _ => None,
-    }
+fn means(error: &Error, what: ExceptionMeaning) -> bool {
+    matches!(error, Error::Exception { meaning, .. } if *meaning == what)
 }
 
 #[cfg(test)]

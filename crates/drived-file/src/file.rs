@@ -83,14 +83,17 @@ impl File {
 const FEATURES: [(&str, &str); 4] =
     [("gateways", "gateway"), ("history", "history"), ("mqtt", "mqtt"), ("webhooks", "webhook")];
 
+/// That this program was built without something, and the words that build it in.
+#[must_use]
+pub fn without(feature: &str) -> String {
+    format!("this drived was built without it: cargo install drived --features {feature} builds it in")
+}
+
 /// Refuses the table of a face that this program was built without, and says how it is built in.
 pub(super) fn not_built_in(source: Source<'_>, left: &DeTable<'_>) -> Result<(), ConfigError> {
     for (table, feature) in FEATURES {
         if let Some((key, _)) = left.get_key_value(table) {
-            let problem = format_args!(
-                "this drived was built without it: cargo install drived --features {feature} builds it in"
-            );
-            return Err(source.error(key.span(), problem));
+            return Err(source.error(key.span(), without(feature)));
         }
     }
     Ok(())

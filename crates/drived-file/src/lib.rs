@@ -24,6 +24,7 @@ use toml::{
 };
 
 use self::file::File;
+pub use self::file::without;
 use drived_config::config::{
     ConfigError, DriveEntry, Entry as _, Environment, Group, Key, LineEntries, LineEntry, LinePart, Members,
     Source, State, groups, line_part, look_alikes, of,

@@ -95,6 +95,22 @@ pub(crate) enum Command {
     History(history::Args),
     #[cfg(feature = "history")]
     Why(why::Args),
+    /// Not in this build
+    #[cfg(not(feature = "history"))]
+    #[command(hide = true, disable_help_flag = true)]
+    History(NotBuiltIn),
+    /// Not in this build
+    #[cfg(not(feature = "history"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Why(NotBuiltIn),
+}
+
+/// Whatever is asked of a subcommand that this program was built without.
+#[cfg(not(feature = "history"))]
+#[derive(Debug, clap::Args)]
+struct NotBuiltIn {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    _asked: Vec<std::ffi::OsString>,
 }
 
 impl Command {
@@ -147,6 +163,8 @@ impl Command {
             Self::History(args) => history::run(&args),
             #[cfg(feature = "history")]
             Self::Why(args) => why::run(&args),
+            #[cfg(not(feature = "history"))]
+            Self::History(_) | Self::Why(_) => Err(Failure::Input(drived_file::without("history"))),
         }
     }
 }

@@ -259,8 +259,9 @@ impl Plant {
 pub fn may_have_written(error: &Error) -> bool {
     match (error, error.kind()) {
         (_, ErrorKind::OutcomeUnknown | ErrorKind::NotConfirmed) => true,
-        (Error::Port { exchange, .. }, ErrorKind::NoAnswer) => matches!(exchange.function, 0x06 | 0x10),
-        (Error::Answer { exchange, .. }, _) => matches!(exchange.function, 0x06 | 0x10),
+        (Error::Port { exchange, .. }, ErrorKind::NoAnswer) | (Error::Answer { exchange, .. }, _) => {
+            exchange.is_write()
+        }
         _ => false,
     }
 }
