@@ -152,6 +152,11 @@ fn the_first_hour_can_be_gone_through_by_the_keyboard_alone() {
 }
 
 #[test]
+fn with_a_mouse_the_stop_hides_nothing_that_stands_beside_it() {
+    look_at_the_demo("mouse");
+}
+
+#[test]
 fn whom_a_command_for_several_means_is_named_it_expires_and_a_stop_unheard_is_sent_again_under_one_id() {
     look_at_three_pumps("several");
 }

@@ -148,14 +148,16 @@ export function past(root) {
       const [name, dash] = LOOKS[index];
       return { label: drive, scale: 'y', stroke: colour(name), dash, width: 1.6, spanGaps: false, points: { show: true, size: 4, filter: alone }, value: (_, one) => quantity(one, digits, unit) };
     });
-    const data = [times, ...curves.map(curve => curve.mean)];
+    const data = [times];
     const bands = [];
+    // The band is drawn first, and the line over it.
     if (curves.length === 1) {
       const edge = text => ({ label: t(text), scale: 'y', stroke: 'transparent', spanGaps: false, points: { show: false }, value: (_, one) => quantity(one, digits, unit) });
-      lines.push(edge('past_greatest'), edge('past_least'));
+      lines.unshift(edge('past_greatest'), edge('past_least'));
       data.push(curves[0].greatest, curves[0].least);
-      bands.push({ series: [2, 3], fill: colour('--fill-ground') });
+      bands.push({ series: [1, 2], fill: colour('--fill-ground') });
     }
+    data.push(...curves.map(curve => curve.mean));
     plot = new window.uPlot({ width: canvas.clientWidth, height: height(), padding: [12, 16, null, null],
       series: [{ label: t('time'), value: (_, seconds) => (seconds ? clock(seconds * 1000) : '—') }, ...lines], bands,
       axes: [timeAxis(tickText, 110), { ...axis('y'), size: 64, values: (_, ticks) => ticks.map(one => quantity(one, Number.isInteger(one) ? 0 : 1, unit)) }],

@@ -25,7 +25,7 @@ export function setup(root) {
   const where = el('p.hint');
   const closed = el('p.remark', { hidden: true });
   const said = el('p.said', { role: 'alert' });
-  const right = el('section.panel', { hidden: true },
+  const right = el('section.panel.setup', { hidden: true },
     el('p', {}, t('setup_right')), el('p.hint', {}, t('setup_link')),
     el('p', {}, el('code', {}, 'drived token link NAME --role engineer')),
     el('p', {}, el('button', { type: 'button', onclick: askToken }, t('setup_token'))));

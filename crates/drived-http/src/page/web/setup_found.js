@@ -80,7 +80,7 @@ export function foundPanel(take) {
     watch.disabled = false;
     if (!changes) return;
     lineName.value = '';
-    setText(said, t('setup_added', { changes: changes.map(told).join(' ; ') }));
+    setText(said, t('setup_added', { names: chosen.map(row => row.name.value).join(', ') }));
   }
 }
 

@@ -54,7 +54,7 @@ export const SETUP_TEXTS = {
   setup_two_lines: ['They answer at different speeds, and a port has one: those of {line} are added.', 'Ils répondent à des vitesses différentes, et un port n’en a qu’une : ceux de {line} sont ajoutés.'],
   setup_watch: ['Watch these drives', 'Observer ces variateurs'],
   setup_watch_one: ['Watch this drive', 'Observer ce variateur'],
-  setup_added: ['Done: {changes}', 'Fait : {changes}'],
+  setup_added: ['Added and watched: {names}', 'Ajoutés et observés : {names}'],
   setup_here: ['3. Look, then take control of one after another', '3. Regarder, puis prendre la commande l’un après l’autre'],
   setup_look: ['Read only: no command is taken for it', 'Lecture seule : aucun ordre accepté'],
   setup_controlled: ['Takes commands', 'Accepte des ordres'],
