@@ -3,7 +3,7 @@
 
 use std::{
     net::IpAddr,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
     time::Duration,
 };
 
@@ -30,6 +30,7 @@ use tower::ServiceExt as _;
 use super::{
     audit::{Audit, Kind, Record, bounded},
     authority::Authority,
+    codes::{self, Codes, Grant},
     crowd::Asking,
     failures::Failures,
     host::{self, Hosts},
@@ -60,12 +61,43 @@ const ANSWERED_WITHIN: Duration = Duration::from_secs(40);
 const API: &str = "/api/";
 pub const LOGIN: &str = "/api/v1/login";
 pub const LOGOUT: &str = "/api/v1/logout";
+/// Where links are made by which a browser begins a session, over the control socket.
+pub const LINKS: &str = "/api/v1/links";
 
-/// By which a session begins.
+/// By which a session begins: one of the two.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LoginBody {
-    token: String,
+    token: Option<String>,
+    /// A code of `drived token link`, which is good once.
+    code: Option<String>,
+}
+
+/// A link that is wished for.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewLink {
+    /// The token by whose name and rights the browser is known.
+    name: String,
+    /// What it may, if there is no such token when the link is used.
+    #[serde(default)]
+    role: Option<Role>,
+    /// For how many days that one is good then; 1 unless it is said.
+    #[serde(default)]
+    days: Option<u32>,
+}
+
+/// A link by which a browser begins a session, once.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+pub struct MadeLink {
+    pub name: String,
+    pub link: String,
+    pub good_for_s: u64,
+}
+
+/// The address at which the page begins a session. What stands behind `#` is sent to nobody by a browser.
+pub(super) fn link(page: &str, code: &str) -> String {
+    format!("{page}#/enter/{code}")
 }
 
 /// Who somebody is.
@@ -146,6 +178,9 @@ pub(super) struct Gate {
     pub(super) tokens: Option<Arc<Tokens>>,
     pub(super) audit: Audit,
     pub(super) sessions: Sessions,
+    pub(super) codes: Codes,
+    /// Where the page is, as soon as it is served.
+    pub(super) page: Arc<OnceLock<String>>,
     /// Wrong tokens, by address.
     pub(super) failures: Mutex<Failures<Option<IpAddr>>>,
     /// What somebody may not do and has asked for, by caller.
@@ -276,7 +311,11 @@ impl Gate {
             return self.route(Request::from_parts(parts, Body::empty())).await;
         }
         if logs_in {
-            return self.log_in(door, peer, caller, &read(LOGIN_BODY).await?);
+            return self.log_in(door, peer, caller, &read(LOGIN_BODY).await?).await;
+        }
+        if path == LINKS {
+            let body = if peer.address().is_none() { read(BODY).await? } else { Bytes::new() };
+            return self.link_for(peer, &caller, &body);
         }
         if caller.rights == Rights::NONE {
             return Err(Refusal::unauthorized("a token is needed"));
@@ -435,18 +474,77 @@ impl Gate {
         self.tokens.as_ref().map_or(Ok(None), |tokens| tokens.find(secret))
     }
 
-    fn log_in(&self, door: &Door, peer: Peer, caller: Caller, body: &[u8]) -> Result<Response, Refusal> {
+    async fn log_in(
+        &self,
+        door: &Door,
+        peer: Peer,
+        caller: Caller,
+        body: &[u8],
+    ) -> Result<Response, Refusal> {
+        const EXPECTED: &str = "{\"token\": \"drv_…\"} or {\"code\": …}";
         self.wait(peer)?;
-        let LoginBody { token: secret } = token_desk::read(body, "{\"token\": \"drv_…\"}")?;
-        let secret = secret.trim();
-        let Some(token) = self.token(secret).map_err(unreadable)? else {
+        let known = match token_desk::read(body, EXPECTED)? {
+            LoginBody { token: Some(secret), code: None } => {
+                let secret = secret.trim();
+                let token = self.token(secret).map_err(unreadable)?;
+                token.map(|token| (token, sha256(secret.as_bytes())))
+            }
+            LoginBody { token: None, code: Some(code) } => self.by_code(code.trim(), &caller).await?,
+            LoginBody { .. } => {
+                return Err(Refusal::new(StatusCode::BAD_REQUEST, format!("expected {EXPECTED}")));
+            }
+        };
+        let Some((token, hash)) = known else {
             return Err(self.failed(peer, &caller));
         };
         let session = tokens::new_secret().map_err(unreadable)?;
-        self.sessions.begin(&session, &sha256(secret.as_bytes()), Instant::now());
+        self.sessions.begin(&session, &hash, Instant::now());
         let caller = of_token(&token, caller);
         self.audit.record(Record::new(Kind::Login, &caller, "login")).whenever();
         Ok(told(&caller, Some(&session), door.encrypted))
+    }
+
+    /// The token of whom a code is for, and its hash. The code is none from then on.
+    async fn by_code(&self, code: &str, caller: &Caller) -> Result<Option<(Token, String)>, Refusal> {
+        let Some(Grant { name, new }) = self.codes.take(code, Instant::now()) else { return Ok(None) };
+        let Some(tokens) = self.tokens.clone() else { return Ok(None) };
+        let of = new.map(|(role, days)| (role, token_desk::of_days(days)));
+        let for_session = move || tokens.for_session(&name, of);
+        let made = tokio::task::spawn_blocking(for_session).await;
+        let made = made.unwrap_or_else(|error| Err(TokenError::Random(error.to_string())));
+        let (token, is_new) = made.map_err(unreadable)?;
+        if is_new {
+            let what = token_desk::added(&token.name, token.role, None);
+            self.audit.record(Record::new(Kind::Token, caller, what)).whenever();
+        }
+        let hash = token.sha256.clone();
+        Ok(Some((token, hash)))
+    }
+
+    /// Makes a link for whoever has every right without one.
+    fn link_for(&self, peer: Peer, caller: &Caller, body: &[u8]) -> Result<Response, Refusal> {
+        if peer.address().is_some() || !caller.rights.engineer {
+            return Err(Refusal::new(StatusCode::FORBIDDEN, "links are made over the control socket"));
+        }
+        let NewLink { name, role, days } = token_desk::read(body, "{\"name\": …, \"role\": …}")?;
+        let Some(tokens) = &self.tokens else {
+            return Err(Refusal::new(StatusCode::NOT_FOUND, "this daemon keeps no tokens"));
+        };
+        let is_there = tokens.all().map_err(unreadable)?.iter().any(|token| token.name == name);
+        if !is_there && role.is_none() {
+            let why = format!("there is no token {name:?}: a role makes one when the link is used");
+            return Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, why));
+        }
+        let grant = Grant { name: name.clone(), new: role.map(|role| (role, days.unwrap_or(1))) };
+        let Some(page) = self.page.get() else {
+            return Err(Refusal::new(StatusCode::NOT_FOUND, "this daemon serves no page"));
+        };
+        let code = self.codes.make(grant, Instant::now()).map_err(unreadable)?;
+        self.audit.record(Record::new(Kind::Token, caller, format!("link for {name}"))).whenever();
+        let made = MadeLink { name, link: link(page, &code), good_for_s: codes::LASTS.as_secs() };
+        let mut answer = Response::new(Body::from(line(&made)));
+        answer.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));
+        Ok(answer)
     }
 
     fn log_out(&self, door: &Door, caller: &Caller, headers: &HeaderMap) -> Response {

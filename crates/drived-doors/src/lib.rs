@@ -13,6 +13,7 @@
 
 pub mod audit;
 mod authority;
+mod codes;
 pub mod config;
 mod connection;
 pub mod crowd;
@@ -36,7 +37,7 @@ pub mod tokens;
 use std::{
     io,
     net::{IpAddr, SocketAddr},
-    sync::Arc,
+    sync::{Arc, OnceLock},
     time::Duration,
 };
 
@@ -50,12 +51,13 @@ use tokio::{
 };
 
 #[cfg(unix)]
-pub use self::gate::{LOGIN, LOGOUT, LoginBody, SessionView};
+pub use self::gate::{LINKS, LOGIN, LOGOUT, LoginBody, MadeLink, NewLink, SessionView};
 #[cfg(unix)]
 use self::socket::Unbound;
 pub use self::socket::usual_places;
 use self::{
     audit::{Audit, Kind, Record},
+    codes::{Codes, Grant},
     config::{DoorsConfig, HttpConfig, SocketConfig},
     connection::DRAINED_WITHIN,
     crowd::{Crowd, Limits, Place},
@@ -97,6 +99,9 @@ pub struct Doors {
     /// Whether every door listens.
     listening: watch::Receiver<bool>,
     audit: Audit,
+    codes: Codes,
+    page: Arc<OnceLock<String>>,
+    has_tokens: bool,
 }
 
 /// Doors that only have to be opened: what they need has been found.
@@ -166,11 +171,15 @@ impl Prepared {
         let (listens, listening) = watch::channel(self.http.is_none());
         let Self { tokens, audit, sessions, .. } = self;
         let (failures, refused, pace, changes) = Default::default();
+        let (codes, page, has_tokens) =
+            (Codes::default(), Arc::<OnceLock<String>>::default(), tokens.is_some());
         let gate = Gate {
             router,
             tokens,
             audit: audit.clone(),
             sessions,
+            codes: codes.clone(),
+            page: Arc::clone(&page),
             failures,
             refused,
             pace,
@@ -186,7 +195,7 @@ impl Prepared {
         if let Some((http, tls)) = self.http {
             tokio::spawn(until_the_end(shared.clone(), serve_http(http, tls, listens, shared)));
         }
-        Doors { ended, gone, listening, audit }
+        Doors { ended, gone, listening, audit, codes, page, has_tokens }
     }
 }
 
@@ -194,6 +203,26 @@ impl Doors {
     /// Becomes true when every door listens.
     pub fn listening(&self) -> watch::Receiver<bool> {
         self.listening.clone()
+    }
+
+    /// A link by which a browser has every right for a day, once and within ten minutes: for whoever has started this program and
+    /// reads its terminal. `None`: no page is served, or nobody can be known by a token.
+    pub fn link_for_whoever_started(
+        &self,
+        name: &str,
+    ) -> impl Future<Output = Option<String>> + Send + use<> {
+        let (mut listening, page, codes) =
+            (self.listening.clone(), Arc::clone(&self.page), self.codes.clone());
+        let grant = Grant { name: name.to_owned(), new: Some((Role::Engineer, 1)) };
+        let has_tokens = self.has_tokens;
+        async move {
+            if !has_tokens {
+                return None;
+            }
+            listening.wait_for(|listens| *listens).await.ok()?;
+            let code = codes.make(grant, Instant::now()).ok()?;
+            Some(gate::link(page.get()?, &code))
+        }
     }
 
     /// The audit log, for what does not come through a door.
@@ -224,10 +253,14 @@ async fn until_the_end(shared: Shared, serve: impl Future<Output = ()>) {
 
 async fn serve_http(config: HttpConfig, tls: Option<Tls>, listens: watch::Sender<bool>, shared: Shared) {
     let listener = listen(config.listen).await;
-    listens.send_replace(true);
     let scheme = if tls.is_some() { "https" } else { "http" };
     let address = listener.local_addr().unwrap_or(config.listen);
     tracing::info!("the page is at {scheme}://{address}/");
+    let _ = shared.gate.page.set(match (config.allowed_hosts.first(), address.ip().is_unspecified()) {
+        (Some(host), true) => format!("{scheme}://{host}:{}/", address.port()),
+        _ => format!("{scheme}://{address}/"),
+    });
+    listens.send_replace(true);
     let door = Door {
         hosts: Hosts::new(Some(address), &config.allowed_hosts),
         freely: config.freely(false),

@@ -93,6 +93,45 @@ async fn a_wrong_token_is_never_taken_for_none_and_ten_a_minute_are_looked_at() 
 }
 
 #[tokio::test]
+async fn a_link_lets_a_browser_in_once_by_the_rights_of_its_token_and_is_made_over_the_socket_alone() {
+    let rig = Rig::new("link");
+    let wanted = Asked { path: "/api/v1/links", body: "{\"name\":\"anna\",\"role\":\"engineer\"}", ..START };
+    rig.ask(&wanted).await.assert_refused(403);
+    let chief = format!("Bearer {}", rig.token("chief", Role::Engineer));
+    rig.ask(&Asked { headers: &[("authorization", &chief)], ..wanted }).await.assert_refused(403);
+    rig.ask_on_socket(&Asked { body: "{\"name\":\"nobody\"}", ..wanted }).await.assert_refused(422);
+    let made = rig.ask_on_socket(&wanted).await;
+    let made: serde_json::Value = serde_json::from_str(&made.body).unwrap();
+    let code =
+        made["link"].as_str().unwrap().strip_prefix("http://127.0.0.1:7580/#/enter/").unwrap().to_owned();
+    // Nobody has a token by a link that was never used.
+    assert_eq!(rig.gate.tokens.as_ref().unwrap().all().unwrap().len(), 1);
+    let enter = |code: &str| format!("{{\"code\":\"{code}\"}}");
+    let login = Asked { path: "/api/v1/login", ..START };
+    rig.ask(&Asked { body: &enter(&code[1..]), ..login }).await.assert_refused(401);
+    for neither in ["{}", &format!("{{\"code\":\"{code}\",\"token\":\"drv_0\"}}")] {
+        rig.ask(&Asked { body: neither, ..login }).await.assert_refused(400);
+    }
+    let entered = rig.ask(&Asked { body: &enter(&code), ..login }).await;
+    assert_eq!(entered.status, StatusCode::OK, "{entered:?}");
+    let set = entered.headers[header::SET_COOKIE].to_str().unwrap();
+    assert!(!set.contains(&code), "{set}");
+    let headers = [("cookie", set.split(';').next().unwrap())];
+    assert_eq!(rig.ask(&Asked { headers: &headers, ..STATE }).await.body, "anna page 127.0.0.1 vsoe");
+    // It was good once.
+    rig.ask(&Asked { body: &enter(&code), ..login }).await.assert_refused(401);
+    // The token of whom the session is, is one as every other.
+    rig.gate.tokens.as_ref().unwrap().remove("anna").unwrap();
+    assert_eq!(rig.ask(&Asked { headers: &headers, ..STATE }).await.body, "anonymous page 127.0.0.1 vs");
+    let audited = rig.audited().await;
+    for one in ["token local -", "token anonymous -", "login anna -", "login_failed anonymous -"] {
+        assert!(audited.iter().any(|line| line == one), "{one}: {audited:?}");
+    }
+    let text = fs::read_to_string(rig.folder.file("audit")).unwrap();
+    assert!(!text.contains(&code), "{text}");
+}
+
+#[tokio::test]
 async fn a_login_gives_a_cookie_that_no_script_reads_and_a_logout_takes_it_back() {
     let rig = Rig::new("login");
     let secret = rig.token("panel", Role::Operate);

@@ -223,6 +223,30 @@ impl Tokens {
         Ok(secret)
     }
 
+    /// The hash of the token of this name, and its role; one whose time is over is none. Where there is none it is made, of which
+    /// nobody knows the secret: it is good for sessions alone.
+    pub(super) fn for_session(
+        &self,
+        name: &str,
+        new: Option<(Role, Duration)>,
+    ) -> Result<(Token, bool), TokenError> {
+        let at = now();
+        let known = |tokens: Vec<Token>| tokens.into_iter().find(|token| token.name == name);
+        if let Some(token) = known(self.all()?) {
+            if token.expires.is_none_or(|expires| at < expires) {
+                return Ok((token, false));
+            }
+            self.remove(name)?;
+        }
+        let Some((role, lasts)) = new else {
+            let there = self.all()?.into_iter().map(|token| token.name).collect();
+            return Err(TokenError::Unknown { name: name.to_owned(), there });
+        };
+        self.add(name, (role, None), Some(lasts))?;
+        let made = known(self.all()?);
+        made.map(|token| (token, true)).ok_or_else(|| self.failed("read", "it was removed at once"))
+    }
+
     /// Gives a token of this name another secret. That which it had is good for `overlap` yet, so that whoever uses it can be
     /// told the new one without being shut out; the times that it ends by itself stays.
     pub fn rotate(&self, name: &str, overlap: Duration) -> Result<(Token, String), TokenError> {

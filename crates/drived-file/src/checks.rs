@@ -10,9 +10,12 @@ use std::{
 
 use drive_bus::Endpoint;
 
-use super::file;
+use serde::Deserialize as _;
+use toml::de::{DeTable, Deserializer};
+
+use super::{added, added::Added, file};
 use drived_config::{
-    config::{ConfigError, Entry as _, LinePart, Source, of},
+    config::{ConfigError, Entry as _, LinePart, Source, State, of},
     profiles::Folder,
 };
 
@@ -32,6 +35,43 @@ pub(super) fn read_file(path: &Path) -> Result<String, String> {
         0 => Err(format!("it is longer than {} KiB: expected a configuration", LONGEST_FILE >> 10)),
         _ => Ok(text),
     }
+}
+
+/// What was added at the page, or is to be; `is_aside`: the configuration has drives of its own.
+pub(super) fn added(
+    state: &State,
+    is_aside: bool,
+    instead: Option<&str>,
+) -> Result<Option<Added>, ConfigError> {
+    let Some(folder) = &state.folder else { return Ok(None) };
+    let file = folder.join(added::FILE);
+    let text = match (instead, read_file(&file)) {
+        (Some(instead), _) => Some(instead.to_owned()),
+        (None, Ok(text)) => Some(text),
+        (None, Err(_)) if !file.exists() => None,
+        // Whoever starts without drives that he has would not be told that they are gone.
+        (None, Err(_)) if is_aside => None,
+        (None, Err(why)) => {
+            let source = Source { file: &file, text: "" };
+            return Err(source.error_of_file(format_args!("cannot be read: {why}")));
+        }
+    };
+    Ok(Some(Added { file, is_aside, text }))
+}
+
+/// A file that has lines and drives, and nothing else.
+pub(super) fn only_plant(source: Source<'_>) -> Result<file::File, ConfigError> {
+    let wrong = |error: toml::de::Error| match error.span() {
+        Some(span) => source.error(span, error.message()),
+        None => source.error_of_file(error.message()),
+    };
+    let tables = DeTable::parse(source.text).map_err(wrong)?;
+    let other = tables.get_ref().keys().find(|key| !["lines", "drives"].contains(&&**key.get_ref()));
+    if let Some(other) = other {
+        let problem = "expected lines and drives alone here: everything else stands in the configuration";
+        return Err(source.error(other.span(), problem));
+    }
+    file::File::deserialize(Deserializer::from(tables)).map_err(wrong)
 }
 
 /// A drive whose profile has been taken out of the folder is one of which nothing is known, whatever this process has read before.

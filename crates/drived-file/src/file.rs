@@ -36,7 +36,7 @@ settings! {
     snapshots: Parsed<Time> = "`\"5s\"`", |to, said| to.snapshots = snapshots(said.0.0)?;
     /// how long the exit may take
     shutdown: Parsed<Time> = "`\"60s\"`", |to, said| to.shutdown = said.0.0;
-    /// the folder of what outlives the daemon: `tokens`, `audit`, `watchdogs.json`, `names.json`, `alarms.json`, `history.sqlite`, `sessions.json`, `webhooks.json`, `sparkplug-bd-seq`; beside the configuration
+    /// the folder of what outlives the daemon: `tokens`, `audit`, `watchdogs.json`, `names.json`, `alarms.json`, `history.sqlite`, `added.toml`, `sessions.json`, `webhooks.json`, `sparkplug-bd-seq`; beside the configuration
     /// unless the path is whole
     state: PathBuf = "the folder that systemd names in `STATE_DIRECTORY`; else one of this user for this configuration, in `$XDG_STATE_HOME/drived` or `~/.local/state/drived`",
         |to, said| to.kept.state = Some(said.clone());
@@ -76,6 +76,11 @@ impl File {
     /// The lines by their names.
     pub(super) fn lines(&self) -> impl Iterator<Item = (&Spanned<String>, &LineEntry)> {
         of(&self.lines).into_iter().flatten()
+    }
+
+    /// Whether it says a line or a drive.
+    pub(super) fn has_plant(&self) -> bool {
+        self.lines().next().is_some() || of(&self.drives).is_some_and(|drives| !drives.is_empty())
     }
 }
 

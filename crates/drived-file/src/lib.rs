@@ -11,6 +11,7 @@
     reason = "a crate of the program: what is public is so for its other crates, who read its sources, and most names say it all"
 )]
 
+pub mod added;
 mod checks;
 mod file;
 pub mod ledger;
@@ -23,8 +24,8 @@ use toml::{
     de::{DeTable, Deserializer},
 };
 
-use self::file::File;
 pub use self::file::without;
+use self::{added::Added, file::File};
 use drived_config::config::{
     ConfigError, DriveEntry, Entry as _, Environment, Group, Key, LineEntries, LineEntry, LinePart, Members,
     Source, State, groups, line_part, look_alikes, of,
@@ -61,24 +62,34 @@ pub struct Config {
     pub doors: DoorsConfig,
     pub lines: Vec<LinePart>,
     pub groups: Vec<Group>,
+    /// Where drives are added at the page; `None`: there is no folder for it.
+    pub added: Option<Added>,
     /// The faces that have a table, and those that are there without one, by its name, in the order in which the program knows them.
     pub faces: Vec<(&'static str, Box<dyn Configured>)>,
 }
 
 impl Config {
-    /// Reads a file.
+    /// Reads a file. The usual one need not be there where drives are added at the page.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
         match checks::read_file(file) {
             Ok(text) => Self::read(file, &text),
-            Err(why) => Err(Source { file, text: "" }.error_of_file(format_args!("cannot be read: {why}"))),
+            Err(why) => {
+                let config = Self::load_or_empty(file)?;
+                match config.lines.is_empty() {
+                    true => {
+                        Err(Source { file, text: "" }.error_of_file(format_args!("cannot be read: {why}")))
+                    }
+                    false => Ok(config),
+                }
+            }
         }
     }
 
     /// Reads a file that may have no drive yet. The usual one need not be there; whoever names another means it.
     pub fn load_or_empty(file: &Path) -> Result<Self, ConfigError> {
         match checks::read_file(file) {
-            Ok(text) => Self::parse(file, &text),
-            Err(_) if file == Path::new(USUAL) && !file.exists() => Self::parse(file, ""),
+            Ok(text) => Self::parse(file, &text, None),
+            Err(_) if is_missing(file) => Self::parse(file, "", None),
             Err(why) => Err(Source { file, text: "" }.error_of_file(format_args!("cannot be read: {why}"))),
         }
     }
@@ -88,6 +99,17 @@ impl Config {
         Self::load_or_empty(file).and_then(Self::workable).map_err(|error| Failure::Input(error.to_string()))
     }
 
+    /// The same, with other drives added at the page than those that stand there.
+    pub fn load_with(file: &Path, added: &str) -> Result<Self, Failure> {
+        let text = match checks::read_file(file) {
+            Ok(text) => text,
+            Err(_) if is_missing(file) => String::new(),
+            Err(why) => return Err(Failure::Input(format!("{}: cannot be read: {why}", file.display()))),
+        };
+        let read = Self::parse(file, &text, Some(added)).and_then(Self::workable);
+        read.map_err(|error| Failure::Input(error.to_string()))
+    }
+
     /// Reads a file whose lines can work.
     pub fn load_workable(file: &Path) -> Result<Self, Failure> {
         Self::load(file).and_then(Self::workable).map_err(|error| Failure::Input(error.to_string()))
@@ -95,7 +117,7 @@ impl Config {
 
     /// Reads the text of a file with drives.
     fn read(file: &Path, text: &str) -> Result<Self, ConfigError> {
-        let config = Self::parse(file, text)?;
+        let config = Self::parse(file, text, None)?;
         if config.lines.is_empty() {
             return Err(
                 Source { file, text }.error_of_file("no drive: expected [[drives]] with line and drive")
@@ -104,7 +126,8 @@ impl Config {
         Ok(config)
     }
 
-    fn parse(file: &Path, text: &str) -> Result<Self, ConfigError> {
+    /// `instead` is read in the place of the file of what is added at the page.
+    fn parse(file: &Path, text: &str, instead: Option<&str>) -> Result<Self, ConfigError> {
         let source = Source { file, text };
         let wrong = |error: toml::de::Error| match error.span() {
             Some(span) => source.error(span, error.message()),
@@ -125,19 +148,14 @@ impl Config {
         raw.set(source, &mut said)?;
         let file::Draft { snapshots, shutdown, kept } = said;
         let state = State::of(source, &kept, &Environment::of_process());
-        let none = LineEntries::new();
-        let members = Members::of(
-            source,
-            of(&raw.lines).unwrap_or(&none),
-            of(&raw.drives).map_or(&[], Vec::as_slice),
-            of(&raw.defaults),
-        )?;
-        checks::profiles(source, &raw, &profiles)?;
-        let mut lines = Vec::new();
-        for (name, entry) in raw.lines() {
-            lines.push(line_part(source, name.get_ref(), name.span(), entry, &members)?);
-        }
-        checks::ports(source, &raw, &lines)?;
+        let added = checks::added(&state, raw.has_plant(), instead)?;
+        let lines = match added.as_ref().and_then(|added| Some((added, added.text.as_deref()?))) {
+            Some((Added { file, is_aside: false, .. }, text)) => {
+                let source = Source { file, text };
+                plant_of(source, &checks::only_plant(source)?, &profiles)?
+            }
+            _ => plant_of(source, &raw, &profiles)?,
+        };
         let drives = lines.iter().flat_map(|line: &LinePart| &line.drives);
         let names = drives.map(|drive| drive.settings.name.as_str());
         let groups = groups(source, of(&raw.groups), names)?;
@@ -151,7 +169,7 @@ impl Config {
             faces.extend(configured.map(|configured| (face.table(), configured)));
         }
         let doors = DoorsConfig::read(source, of(&raw.http), of(&raw.socket), state)?;
-        Ok(Self { doors, faces, snapshots, shutdown, lines, groups })
+        Ok(Self { doors, faces, snapshots, shutdown, lines, groups, added })
     }
 
     /// What the file says of the face with this table; `None`: nothing.
@@ -197,6 +215,29 @@ impl Config {
             None => Ok(self),
         }
     }
+}
+
+/// Whether it is the usual one, and not there.
+fn is_missing(file: &Path) -> bool {
+    file == Path::new(USUAL) && !file.exists()
+}
+
+/// The lines and drives that a file says.
+fn plant_of(source: Source<'_>, raw: &File, profiles: &Folder) -> Result<Vec<LinePart>, ConfigError> {
+    let none = LineEntries::new();
+    let members = Members::of(
+        source,
+        of(&raw.lines).unwrap_or(&none),
+        of(&raw.drives).map_or(&[], Vec::as_slice),
+        of(&raw.defaults),
+    )?;
+    checks::profiles(source, raw, profiles)?;
+    let mut lines = Vec::new();
+    for (name, entry) in raw.lines() {
+        lines.push(line_part(source, name.get_ref(), name.span(), entry, &members)?);
+    }
+    checks::ports(source, raw, &lines)?;
+    Ok(lines)
 }
 
 /// The drives from files that the configuration may name.

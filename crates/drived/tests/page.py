@@ -468,7 +468,8 @@ def axe(page, url, token):
     drive = page.locator(".rows .row a").first.get_attribute("href")
     page.goto(f"{url}#/lines")
     line = page.locator("main a").first.get_attribute("href")
-    views = {"overview": "#/", "alarms": "#/alarms", "lines": "#/lines", "events": "#/events", "drive": drive, "line": line}
+    views = {"overview": "#/", "alarms": "#/alarms", "lines": "#/lines", "events": "#/events", "drive": drive, "line": line,
+             "setup": "#/setup", "past": "#/past", "at": "#/at/2026-11-21T03:12"}
     # One alarm that waits, so that there is something to be seen.
     happen("atv312@2 trip OLF")
     expect(page.locator("nav a .count")).to_have_text("1")
@@ -709,7 +710,7 @@ def touched(page, url, token):
     for _ in ["en", "fr"]:
         for width in [1440, 1024, 390]:
             page.set_viewport_size({"width": width, "height": 844})
-            for view in ["#/", "#/?view=tiles", "#/alarms", "#/lines", "#/events", "#/drive/pump 2", "#/line/north"]:
+            for view in ["#/", "#/?view=tiles", "#/alarms", "#/lines", "#/events", "#/drive/pump 2", "#/line/north", "#/setup", "#/past", "#/at/2026-11-21T03:12"]:
                 page.goto(url + view)
                 expect(page.locator("main h1")).to_be_attached()
                 # The view is there when something of it is.
@@ -754,7 +755,287 @@ def pairs(page, url):
     assert not [text for text in french if left.search(text)], sorted({text for text in french if left.search(text)})
 
 
+def several(page, url, token):
+    """Whom a command for several means is named before it is sent; it expires, and a stop that nobody has heard is sent again under its one id."""
+    page.goto(url)
+    log_in(page, token)
+    live(page)
+    sent = []
+    page.on("request", lambda request: request.method == "POST" and sent.append((urlsplit(request.url).path, json.loads(request.post_data or "{}"))))
+    page.get_by_label("Select all that are shown").check()
+    page.locator(".selection").get_by_role("button", name="Start 3").click()
+    dialog = page.locator("dialog")
+    expect(dialog).to_contain_text("These are: pump 1, pump 2, pump 3.")
+    # A no is no command.
+    dialog.get_by_role("button", name="Cancel").click()
+    assert not sent, sent
+    page.get_by_label("Select pump 2").uncheck()
+    page.locator(".selection").get_by_role("button", name="Start 2").click()
+    expect(dialog).to_contain_text("These are: pump 1, pump 3.")
+    dialog.locator("button.primary").click()
+    expect(page.locator(".several")).to_contain_text("pump 1, pump 3")
+    path, body = sent[-1]
+    assert path.endswith("/selected/start") and body["drives"] == ["pump 1", "pump 3"] and 0 < body["expires_in_ms"] <= 10_000, sent
+    for name in ["pump 1", "pump 3"]:
+        expect(page.locator(f".rows .row[data-name='{name}']")).to_have_attribute("data-state", "running")
+    # A group's start is one for those who were named, and expires too.
+    page.get_by_label("Group", exact=True).select_option(index=1)
+    page.get_by_role("button", name="Start group").click()
+    expect(dialog).to_contain_text("Start the 3 drives of the group")
+    dialog.locator("button.primary").click()
+    expect(page.locator(".rows .row[data-name='pump 2']")).to_have_attribute("data-state", "running")
+    path, body = next((path, body) for path, body in reversed(sent) if path.endswith("/start"))
+    assert "/groups/" in path and 0 < body["expires_in_ms"] <= 10_000, (path, body)
+    # Two of its stops are swallowed on the way.
+    stops = []
+
+    def swallow(route):
+        stops.append(json.loads(route.request.post_data))
+        return route.abort() if len(stops) < 3 else route.continue_()
+
+    page.route("**/api/v1/groups/*/stop*", swallow)
+    page.get_by_role("button", name="Stop group").click()
+    expect(page.locator("#outcomes")).to_contain_text("The stop is sent again, attempt 3")
+    for name in ["pump 1", "pump 2", "pump 3"]:
+        expect(page.locator(f".rows .row[data-name='{name}']")).to_have_attribute("data-state", "ready")
+    expect(page.locator("#outcomes")).to_contain_text("confirmed")
+    assert len(stops) == 3 and len({one["id"] for one in stops}) == 1, stops
+
+
+class Hand:
+    """Who uses the page: by clicks, or by the keyboard alone. What he does is counted."""
+
+    def __init__(self, page, keys):
+        self.page, self.keys, self.done, self.began = page, keys, 0, time.monotonic()
+
+    def press(self, one):
+        expect(one).to_be_enabled()
+        self.done += 1
+        if not self.keys:
+            return one.click()
+        self.reach(one)
+        kind = one.evaluate("one => one.type")
+        self.page.keyboard.press("Space" if kind in ("checkbox", "radio") else "Enter")
+
+    def write(self, one, text):
+        self.done += 1
+        if not self.keys:
+            return one.fill(text)
+        self.reach(one)
+        self.page.keyboard.press("ControlOrMeta+a")
+        self.page.keyboard.type(text)
+
+    def reach(self, one):
+        """Goes there by Tab, however far it is; a radio button that is not chosen by an arrow from the chosen one."""
+        for _ in range(200):
+            if one.evaluate("one => one === document.activeElement"):
+                return
+            group = one.evaluate("one => one.type === 'radio' && document.activeElement?.name === one.name")
+            self.page.keyboard.press("ArrowDown" if group else "Tab")
+        raise AssertionError(f"no key reaches {one}")
+
+
+def first_hour(page, url, link, port, keys=False):
+    """From a daemon without a drive to a motor that turns, and nothing is started, or written, before it is asked for."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    hand = Hand(page, keys)
+    page.goto(url)
+    expect(page.locator(".nothing")).to_contain_text("No drive is configured yet")
+    judged(Axe(), page, "without drives")
+    # Whoever is not known may look, and is told how he becomes known.
+    hand.press(page.locator(".nothing a"))
+    expect(page.locator("main")).to_contain_text("drived token link NAME --role engineer")
+    expect(page.get_by_role("button", name="Scan", exact=True)).to_be_hidden()
+    page.goto(link)
+    expect(page.locator("#connection")).to_contain_text("anna")
+    assert link.rsplit("/", 1)[1] not in page.url, page.url
+    form = page.locator("section.setup form").first
+    if keys:
+        hand.reach(form.locator("input[type=radio]").last)
+        page.keyboard.press("Space")
+    else:
+        hand.press(form.locator("input[type=radio]").last)
+    hand.write(form.locator("input[type=text]"), port)
+    judged(Axe(), page, "which port")
+    hand.press(page.get_by_role("button", name="Scan", exact=True))
+    expect(page.locator("progress")).to_be_visible()
+    judged(Axe(), page, "a scan")
+    expect(page.locator("main")).to_contain_text("every address was asked. Found: 2")
+    finds = page.locator(".finds .find")
+    expect(finds).to_have_count(2)
+    expect(finds.first).to_contain_text("by its own words")
+    # Whom no register tells is told by his nameplate.
+    expect(finds.nth(1)).to_contain_text("see its nameplate")
+    expect(finds.nth(1).locator("input[type=checkbox]")).not_to_be_checked()
+    hand.done += 1
+    if keys:
+        hand.reach(finds.nth(1).locator("select"))
+        page.keyboard.type("wj200")
+    else:
+        finds.nth(1).locator("select").select_option("wj200")
+    expect(finds.nth(1).locator("select")).to_have_value("wj200")
+    expect(finds.nth(1).locator("input[type=checkbox]")).to_be_checked()
+    judged(Axe(), page, "who answers")
+    hand.write(finds.first.locator("input[type=text]"), "pump")
+    hand.write(finds.nth(1).locator("input[type=text]"), "fan")
+    hand.press(page.get_by_role("button", name="Watch these drives"))
+    added = page.locator(".added .find")
+    expect(added).to_have_count(2)
+    pump = page.locator(".added .find[data-name=pump]")
+    expect(pump).to_have_attribute("data-quality", "good")
+    expect(pump).to_contain_text("Read only")
+    # What is only read takes no command, whoever asks.
+    refused = page.evaluate("""fetch('api/v1/drives/pump/start', { method: 'POST', headers: { 'Content-Type': 'application/json' },
+        body: '{"direction": "forward"}' }).then(answer => answer.json())""")
+    assert refused.get("outcome") == "refused", refused
+    hand.press(pump.get_by_role("button"))
+    hand.press(page.locator("dialog button.primary"))
+    expect(pump).to_contain_text("Takes commands")
+    expect(page.locator(".added .find[data-name=fan]")).to_contain_text("Read only")
+    judged(Axe(), page, "added drives")
+    hand.press(pump.locator("a"))
+    hand.write(page.locator(".orders input[type=number], .orders input[type=text]").first, "25")
+    hand.press(page.get_by_role("button", name="Set the setpoint"))
+    expect(page.locator(".big")).to_contain_text("25.0\u00a0Hz")
+    hand.press(page.get_by_role("button", name="Start forward"))
+    hand.press(page.locator("dialog button.primary"))
+    expect(page.locator(".drive-head")).to_have_attribute("data-state", "running")
+    page.wait_for_function("parseFloat(document.querySelector('.big dd').textContent) >= 24.9")
+    print(f"first hour: {time.monotonic() - hand.began:.0f} s, {hand.done} clicks and fields{' by keys alone' if keys else ''}", file=sys.stderr)
+    # The link was good once.
+    other = page.context.browser.new_context().new_page()
+    other.goto(link)
+    expect(other.locator("main")).to_contain_text("not good any more")
+    other.context.close()
+    # Whoever comes back finds what was done; no other is asked by it.
+    page.goto(url + "#/setup")
+    expect(page.locator(".added .find")).to_have_count(2)
+    # Whoever runs goes on undisturbed by what becomes of others.
+    read = "fetch('api/v1/drives/pump').then(answer => answer.json())"
+    before = page.evaluate(read)
+    fan = page.locator(".added .find[data-name=fan]")
+    hand.press(fan.get_by_role("button"))
+    hand.press(page.locator("dialog button.primary"))
+    expect(fan).to_contain_text("Takes commands")
+    hand.press(fan.get_by_role("button"))
+    hand.press(page.locator("dialog button.primary"))
+    expect(fan).to_contain_text("Read only")
+    after = page.evaluate(read)
+    assert before["status"]["state"] == after["status"]["state"] == "running", after
+    assert before["counters"]["lost"] == after["counters"]["lost"], after
+    assert after["counters"]["polls"] > before["counters"]["polls"], after
+    # A drive that runs by a command of ours is not let out of reach.
+    hand.press(page.locator(".added .find[data-name=pump]").get_by_role("button"))
+    hand.press(page.locator("dialog button.primary"))
+    expect(page.locator(".said")).to_contain_text("Stop it first")
+
+
+def first_hour_keys(page, url, link, port):
+    first_hour(page, url, link, port, keys=True)
+
+
+def past(page, url, token):
+    """What the history holds: drawn with its gaps, at a moment, and as a journal; nothing is told that was not known."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    page.goto(url)
+    log_in(page, token)
+    live(page)
+    happen("atv312@2 trip OLF")
+    expect(page.locator(".rows .row").first).to_contain_text("OLF")
+    tripped = page.evaluate("fetch('api/v1/state').then(answer => answer.json()).then(state => state.time_unix_ms)")
+    # The history writes when a minute's worth has come, or earlier: what happened is there, or is waited for.
+    page.wait_for_function(f"""fetch('api/v1/history/records?from_unix_ms={tripped - 600000}&to_unix_ms={tripped + 600000}')
+        .then(answer => answer.json()).then(told => told.records.some(one => one.what === 'tripped'))""", polling=500)
+    page.goto(f"{url}#/events")
+    page.get_by_role("link", name="Long trends").click()
+    expect(page.locator("main.view-past h1")).to_be_attached()
+    expect(page.locator(".uplot")).to_have_count(1)
+    for name in ["pump 2", "pump 3"]:
+        page.get_by_label(name, exact=True).check()
+    # Of a day of which minutes are known it is said so, and the rest is no value.
+    expect(page.locator("main")).to_contain_text("pump 2: ")
+    told = page.evaluate("""fetch('api/v1/history/kept').then(answer => answer.json())""")
+    assert told["drives"], told
+    judged(Axe(), page, "long trends")
+    page.get_by_role("button", name="Hour", exact=True).click()
+    expect(page.get_by_role("button", name="Hour", exact=True)).to_have_attribute("aria-pressed", "true")
+    address = page.url
+    assert "from=" in address and "drives=" in address, address
+    page.reload()
+    expect(page.get_by_label("pump 3", exact=True)).to_be_checked()
+    expect(page.locator(".uplot")).to_have_count(1)
+    # A drag zooms in, and a click leads to the moment.
+    over = page.locator(".u-over").bounding_box()
+    middle = over["y"] + over["height"] / 2
+    page.mouse.move(over["x"] + over["width"] * .5, middle)
+    page.mouse.down()
+    page.mouse.move(over["x"] + over["width"] * .95, middle, steps=5)
+    page.mouse.up()
+    expect(page.get_by_role("button", name="Hour", exact=True)).to_have_attribute("aria-pressed", "false")
+    page.locator(".u-over").click()
+    page.get_by_role("link", name="What happened at").click()
+    expect(page.locator("main.view-at h1")).to_be_attached()
+    # The minute of the trip: the trip with its drive, how all were, and why.
+    wall = page.evaluate("""at => new Date(at).toISOString().slice(0, 16) + 'Z'""", tripped)
+    page.goto(f"{url}#/at/{wall}")
+    row = page.locator("table.events tr", has_text="pump 2")
+    expect(row.first).to_contain_text("Tripped")
+    expect(page.locator("main.view-at table").first).to_contain_text("pump 3")
+    page.get_by_role("button", name="Why: pump 2 at this moment").click()
+    expect(page.locator(".story")).to_contain_text("OLF")
+    judged(Axe(), page, "a moment")
+    # Before there was a daemon nothing is known, and nothing is told.
+    page.goto(f"{url}#/at/2001-01-01T00:00")
+    expect(page.locator("main")).to_contain_text("Nothing is recorded of these ten minutes.")
+    page.goto(f"{url}#/events")
+    page.get_by_role("button", name="Older, from the history").click()
+    expect(page.locator("main")).to_contain_text("The history holds nothing older.")
+    judged(Axe(), page, "the journal")
+
+
+def mouse(page, url):
+    """With a mouse the stop is wider, by its keys: on no width does it hide what stands beside it."""
+    page.goto(url)
+    for width in [1440, 1280, 1024, 800]:
+        page.set_viewport_size({"width": width, "height": 844})
+        ends = page.evaluate("[...document.querySelectorAll('.bar a, .bar button')].map(one => one.getBoundingClientRect()).filter(one => one.width).map(one => one.right)")
+        stop = page.locator("#stop").bounding_box()
+        assert max(ends) <= stop["x"], (width, ends, stop)
+
+
+def autumn(page, url):
+    """The hour that comes twice when the clock is put back, wherever the daemon is."""
+    # The daemon's zone is what it says it is.
+    def paris(route):
+        answer = route.fetch()
+        state = answer.json()
+        state["daemon"]["zone"] = "Europe/Paris"
+        route.fulfill(response=answer, json=state)
+
+    page.route("**/api/v1/state", paris)
+    page.goto(f"{url}#/at/2026-10-25T02:30")
+    expect(page.locator("main")).to_contain_text("This time came twice")
+    which = page.locator("main p.chips a.button", has_text="UTC")
+    # tzdata: Europe/Paris left UTC+2 at 2026-10-25 01:00 UTC.
+    assert [text.replace("\u00a0", " ")[-5:] for text in which.all_inner_texts()] == ["UTC+2", "UTC+1"], which.all_inner_texts()
+    asked = []
+    page.on("request", lambda request: "moment" in request.url and asked.append(request.url))
+    which.nth(1).click()
+    expect(page.locator("main h1")).to_contain_text("UTC+1")
+    assert asked and asked[-1].endswith("at_unix_ms=1792891800000"), asked
+    page.goto(f"{url}#/at/2026-03-29T02:30")
+    expect(page.locator("main")).to_contain_text("This time did not exist")
+    page.goto(f"{url}#/at/never")
+    expect(page.locator("main")).to_contain_text("is no time")
+    page.goto(f"{url}#/past?from=2026-10-24T12:00&to=2026-10-25T12:00")
+    expect(page.locator("main")).to_contain_text("the clock was put back")
+
+
 SCENES = {
+    "first_hour": (first_hour, DESK | {"bypass_csp": True}), "first_hour_keys": (first_hour_keys, DESK | {"bypass_csp": True}),
+    "mouse": (mouse, DESK | {"locale": "fr-FR"}), "several": (several, DESK), "past": (past, DESK | {"bypass_csp": True}), "autumn": (autumn, DESK),
     "pairs": (pairs, DESK), "folded": (folded, DESK), "alarms": (alarms, DESK), "somebody": (somebody, DESK),
     "zones": (zones, DESK | {"timezone_id": "Pacific/Kiritimati"}), "touched": (touched, PHONE | {"is_mobile": False}),
     "loads": (loads, DESK), "trip": (trip, DESK), "stop_all": (stop_all, DESK), "phone": (phone, PHONE),
@@ -803,7 +1084,9 @@ def main(name, url, *tokens):
         scene(page, url, *tokens)
         browser.close()
     # A request that a scene cuts off by itself is told in the console.
-    cut = {"restarted": "status of 404", "away": "ERR_FAILED", "clocks": "ERR_FAILED", "proxy": "status of"}.get(name)
+    cut = {"restarted": "status of 404", "away": "ERR_FAILED", "clocks": "ERR_FAILED", "proxy": "status of",
+           # What is refused there is refused on purpose.
+           "several": "ERR_FAILED", "first_hour": "status of 4", "first_hour_keys": "status of 4"}.get(name)
     wrong = [one for one in complaints if not cut or cut not in one]
     assert not wrong, wrong
 

@@ -142,6 +142,36 @@ fn no_view_breaks_a_rule_of_axe() {
 }
 
 #[test]
+fn the_first_hour_goes_from_an_empty_daemon_to_a_turning_motor_in_the_browser() {
+    begin_at_the_page("first_hour");
+}
+
+#[test]
+fn the_first_hour_can_be_gone_through_by_the_keyboard_alone() {
+    begin_at_the_page("first_hour_keys");
+}
+
+#[test]
+fn with_a_mouse_the_stop_hides_nothing_that_stands_beside_it() {
+    look_at_the_demo("mouse");
+}
+
+#[test]
+fn whom_a_command_for_several_means_is_named_it_expires_and_a_stop_unheard_is_sent_again_under_one_id() {
+    look_at_three_pumps("several");
+}
+
+#[test]
+fn what_was_is_shown_as_long_trends_as_a_moment_and_as_a_journal() {
+    look_at_three_pumps("past");
+}
+
+#[test]
+fn a_moment_of_the_doubled_hour_is_asked_for_twice_and_told_with_its_zone() {
+    look_at_three_pumps("autumn");
+}
+
+#[test]
 fn two_hundred_drives_are_listed_and_searched() {
     let Some(python) = python() else { return };
     let lines: Vec<_> = (0..8).map(|line| Sim::serve(&format!("page-{line}"), &["atv312@1-25"])).collect();
@@ -158,6 +188,44 @@ fn two_hundred_drives_are_listed_and_searched() {
     }
     let config = File::new("page-200", &text);
     look(&python, "many", &["run", "--config", config.path()], &[], None);
+}
+
+/// A daemon without a drive beside a line with two, one of a family that is built in and one that a file describes: a browser that is
+/// let in by a link finds them, names them, looks, and takes control of one.
+fn begin_at_the_page(scene: &str) {
+    let Some(python) = python() else { return };
+    let mut sim = Sim::serve(&format!("page-{scene}"), &["atv312@1", "wj200@3"]);
+    let (state, socket) = (path(&format!("page-{scene}-state")), path(&format!("page-{scene}.sock")));
+    let config =
+        File::new(&format!("page-{scene}"), &format!("state = {:?}\n", state.to_str().expect("it is text")));
+    let socket = socket.to_str().expect("the path is text");
+    let link = || {
+        let named = ["anna", "--role", "engineer", "--config", config.path(), "--socket", socket];
+        run(&[&["token", "link"], &named[..]].concat()).assert_done().trim().to_owned()
+    };
+    let port = sim.link().to_owned();
+    look_with(
+        &python,
+        scene,
+        &["run", "--config", config.path(), "--socket", socket],
+        || vec![link(), port],
+        Some(&mut sim),
+    );
+    // What it has written is read by a person, and by the next daemon.
+    let written = std::fs::read_to_string(state.join("added.toml")).expect("it is written");
+    assert!(written.starts_with("# Drives that were added at the page of drived."), "{written}");
+    assert_eq!(written.matches("control = true").count(), 1, "{written}");
+    let checked = run(&["check", "--config", config.path()]);
+    assert!(checked.assert_done().contains("added.toml, added at the page"), "{checked:?}");
+    // A configuration with drives of its own wins whole, and says so.
+    let own = "[lines.a]\nport = \"tcp://192.0.2.1:502\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\n";
+    let own = File::new(
+        &format!("page-{scene}-own"),
+        &format!("state = {:?}\n{own}", state.to_str().expect("it is text")),
+    );
+    let checked = run(&["check", "--config", own.path()]);
+    assert!(checked.assert_done().contains("NOT READ: the drives of"), "{checked:?}");
+    let _ = std::fs::remove_dir_all(state);
 }
 
 /// Three pumps, of which whoever has no token sees and stops all; the tokens that a scene asks for are for all and for one.
@@ -185,7 +253,7 @@ fn look_at_three_pumps(scene: &str) {
         run(&[&add, words].concat()).assert_done().trim().to_owned()
     };
     let tokens: &[String] = match scene {
-        "trip" | "questions" | "axe" | "axe_dark" | "folded" | "alarms" | "touched" => {
+        "trip" | "questions" | "axe" | "axe_dark" | "folded" | "alarms" | "touched" | "past" | "several" => {
             &[token(&["operator"])]
         }
         "scoped" | "somebody" => &[token(&["operator"]), token(&["second", "--drive", "pump 2"])],
@@ -202,17 +270,31 @@ fn look_at_the_demo(scene: &str) {
 }
 
 /// Plays a scene with the page of the program that these arguments start; what it wants to happen is said to the drives.
-fn look(python: &Path, scene: &str, arguments: &[&str], tokens: &[String], mut drives: Option<&mut Sim>) {
+fn look(python: &Path, scene: &str, arguments: &[&str], tokens: &[String], drives: Option<&mut Sim>) {
+    look_with(python, scene, arguments, || tokens.to_vec(), drives);
+}
+
+/// The same with what is found out when the program runs.
+fn look_with(
+    python: &Path,
+    scene: &str,
+    arguments: &[&str],
+    told: impl FnOnce() -> Vec<String>,
+    mut drives: Option<&mut Sim>,
+) {
     let _alone = ONE_BY_ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let port =
         TcpListener::bind("127.0.0.1:0").expect("a port is free").local_addr().expect("it has one").port();
     let address = format!("127.0.0.1:{port}");
     let _served = Running::start_unread(&[arguments, &["--http", &address]].concat());
+    while std::net::TcpStream::connect(&address).is_err() {
+        std::thread::yield_now();
+    }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/page.py");
     let mut looking = Command::new(python)
         .arg(script)
         .args([scene, &format!("http://{address}/")])
-        .args(tokens)
+        .args(told())
         .stdout(Stdio::piped())
         .spawn()
         .expect("the script starts");

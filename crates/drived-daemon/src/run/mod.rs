@@ -4,6 +4,7 @@ mod descriptors;
 mod eeprom;
 mod exit;
 mod faces;
+mod here;
 mod json;
 mod notify;
 mod picture;
@@ -11,15 +12,10 @@ mod profiles;
 mod reload;
 mod report;
 mod runs;
+mod setup;
 mod watchdogs;
 
-use std::{
-    collections::HashMap,
-    io::IsTerminal as _,
-    path::{Path, PathBuf},
-    sync::Arc,
-    time::Duration,
-};
+use std::{collections::HashMap, io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
 
 use drive_bus::Line;
 use drive_families::Options;
@@ -51,7 +47,7 @@ use drived_doors::{
 use drived_face::Surroundings;
 use drived_file::{Config, ledger};
 use drived_http::{
-    api::{self, Reload as _},
+    api::{self, Reload as _, setup::Setup as _},
     metrics, page,
 };
 use drived_plant::{
@@ -93,7 +89,8 @@ pub struct Args {
 
 pub async fn run(args: Args) -> Result<(), Failure> {
     let config = Config::load_to_begin(&args.config)?;
-    for doubt in config.doubts() {
+    let aside = config.added.as_ref().and_then(|added| added.aside(&args.config));
+    for doubt in config.doubts().into_iter().chain(aside) {
         tracing::warn!("{doubt}");
     }
     descriptors::check(config.lines.len())?;
@@ -143,14 +140,20 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let by_profile = tokio::spawn(by_profile);
     let faces = Faces::open(faces, Surroundings::new(plant.clone(), doors.audit(), names.clone()));
     let shutdown = config.shutdown;
-    if config.lines.is_empty() {
-        tell_beginning(&args.config);
-    }
+    let beginning = config.lines.is_empty().then(|| args.config.clone());
     let reloader =
         Reloader::new(plant.clone(), notify.clone(), names, faces.clone(), opened, args.config, config);
-    let router = api::router(plant.clone()).merge(api::reload_router(reloader.clone())).merge(page::router());
+    let first_hour = setup::Desk::new(reloader.clone());
+    let router = api::router(plant.clone())
+        .merge(api::reload_router(reloader.clone()))
+        .merge(api::setup::setup_router(first_hour.clone()))
+        .merge(page::router());
     let sources: Vec<Arc<dyn Source>> = vec![Arc::new(reloader.clone()), Arc::new(faces.clone())];
     let doors = doors.open(metrics::serve(router, plant.clone(), sources));
+    if let Some(file) = beginning {
+        let is_read = std::io::stderr().is_terminal();
+        tokio::spawn(tell_beginning(file, is_read.then(|| doors.link_for_whoever_started("terminal"))));
+    }
     plant.follow_audit(doors.audit().failing());
     let audited = doors.follow(fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());
@@ -179,6 +182,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     }
     drop(watching);
     findings.abort();
+    first_hour.cancel();
     // What becomes of the motors is told in words.
     let screen = OptionFuture::from(screen.map(Screen::close));
     let screen = tokio::spawn(screen);
@@ -211,13 +215,17 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     ended.and(read.unwrap_or(Ok(())))
 }
 
-/// Says what is done first where there is no drive yet.
-fn tell_beginning(file: &Path) {
+/// Says what is done first where there is no drive yet. Whoever has started the program and reads its terminal has every right to it: he
+/// is told a link by which his browser has them too. What is read by others, such as a journal, never has one.
+async fn tell_beginning(file: PathBuf, link: Option<impl Future<Output = Option<String>>>) {
     let file = file.display();
-    tracing::warn!(
-        "no drive yet: drived scan --line PORT,19200,8E1 --save {file} finds those of a port and writes them down, read only; then \
-         drived reload"
-    );
+    match OptionFuture::from(link).await.flatten() {
+        Some(link) => tracing::warn!("no drive yet. Find them in a browser, within ten minutes: {link}"),
+        None => tracing::warn!(
+            "no drive yet: find them at the page, as drived token link NAME --role engineer lets a browser in, or by drived scan --line \
+             PORT,19200,8E1 --save {file}, then drived reload"
+        ),
+    }
 }
 
 /// Gives what there is its numbers and topics, and says in the log what has changed.

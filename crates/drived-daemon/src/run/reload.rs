@@ -15,6 +15,7 @@ use tokio::{sync::Mutex, time::Instant};
 use self::changes::{Change, changes};
 use super::{
     faces::{self, Faces},
+    here::{self, Here},
     notify::Notify,
     profiles::Opened,
 };
@@ -122,6 +123,7 @@ impl Reloader {
         let closed: Vec<&str> = changes.iter().filter_map(Change::closed_face).collect();
         self.0.faces.exchange(&closed, openings).await;
         config.faces = std::mem::take(&mut new.faces);
+        config.added = new.added.take();
         if !changes.is_empty() {
             plant.revisions().begin_anew();
         }
@@ -137,34 +139,78 @@ impl Reloader {
     }
 }
 
-impl Reload for Reloader {
-    /// Reads the file and does what has changed in it, or with `dry_run` only says what that would be: one sentence each. The
-    /// whole file is read and checked first.
-    ///
-    /// A drive whose settings alone have changed keeps its task, its snapshot and its motor. One that is removed, or whose
-    /// line, address, family or options have changed, ends by its policy, as at the exit.
+impl Reloader {
+    /// What holds now, as far as the first hour asks.
+    pub(super) async fn holds(&self) -> Here {
+        Here::of(&self.0.file, &*self.0.config.lock().await)
+    }
+
+    /// Whether this daemon has something to end at a drive: a run of its own, or a stop.
+    pub(super) fn is_answered_for(&self, drive: &str) -> bool {
+        let Some(drive) = self.0.plant.fleet().drive(drive) else { return false };
+        let now = drive.snapshot();
+        now.lease.is_some()
+            || now.stop.is_some()
+            || now.suspended.is_some()
+            || now.run_command_stands.is_some()
+    }
+
+    /// Changes what was added at the page, and has it hold by the way of every reload: `change` makes the new text of the old one.
+    /// The whole is read and checked before anything is written.
     ///
     /// # Errors
-    /// [`Failure::Input`] with what is wrong in the file; the old configuration holds then. [`Failure::Drive`] when a motor
-    /// whose drive was removed may turn, and when only a part could be done: it says what holds then.
-    async fn reload(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
+    /// [`Failure::Input`]: nothing is written and nothing has changed. Others as of [`Self::reload`].
+    pub(super) async fn change_added(
+        &self,
+        change: impl FnOnce(Option<&str>) -> Result<String, Failure> + Send + 'static,
+    ) -> Result<Vec<String>, Failure> {
         let mut config = self.0.config.lock().await;
         let file = self.0.file.clone();
-        // A name of a server may have to be looked up.
-        let read = tokio::task::spawn_blocking(move || Config::load_workable(&file)).await;
-        let read = read.unwrap_or_else(|_| Err(Failure::Input("the file could not be read".to_owned())));
-        let read = read.and_then(|new| match config.new_doubt(&new) {
-            Some(doubt) => Err(Failure::Input(format!("a new name: {doubt}"))),
-            None => Ok(new),
+        let read = blocking(move || {
+            // As it stands now: a person may have changed it.
+            let there = Config::load_to_begin(&file)?;
+            if let Some(closed) = here::closed(there.added.as_ref()) {
+                return Err(Failure::Input(here::why(closed, &file)));
+            }
+            let before = there.added.and_then(|added| added.text);
+            let new = Config::load_with(&file, &change(before.as_deref())?)?;
+            Ok((before, new))
         });
-        if dry_run {
-            let changes = changes(&config, &read?);
-            return Ok(changes.iter().map(|change| change.would_be(&self.0.plant.fleet())).collect());
+        let (before, new) = read.await?;
+        no_new_doubt(&config, &new)?;
+        // Whoever adds a drive takes none away, whatever else has become of the files since they were read.
+        let all = changes(&config, &new);
+        let gone =
+            all.iter().find(|change| change.removed_drive().is_some() || change.closed_line().is_some());
+        if let Some(gone) = gone {
+            return Err(Failure::Input(format!(
+                "the files have changed since they were read, and by them {}: drived reload first",
+                gone.would_be(&self.0.plant.fleet())
+            )));
         }
+        let Some(added) = new.added.clone() else { return Ok(Vec::new()) };
+        let written = added.clone();
+        let write = move || {
+            written.write(written.text.as_deref().unwrap_or_default()).map_err(|error| {
+                Failure::Input(format!("{} cannot be written: {error}", written.file.display()))
+            })
+        };
+        blocking(write).await?;
+        let done = self.take(&mut config, Ok(new)).await;
+        if let Err(Failure::Input(_)) = &done {
+            // What does not hold is not found there by the next start.
+            let back = move || added.write(before.as_deref().unwrap_or_default());
+            let _ = tokio::task::spawn_blocking(back).await;
+        }
+        done
+    }
+
+    /// Makes what was read hold, and tells everybody.
+    async fn take(&self, config: &mut Config, read: Result<Config, Failure>) -> Result<Vec<String>, Failure> {
         let reloaded = match read {
             Ok(new) => {
                 self.0.notify.reloading();
-                let done = self.carry_out(&mut config, new).await;
+                let done = self.carry_out(config, new).await;
                 self.0.notify.reloaded();
                 done
             }
@@ -194,6 +240,45 @@ impl Reload for Reloader {
             true => Ok(changes.iter().map(ToString::to_string).collect()),
             false => Err(Failure::Drive(may_turn(&turning))),
         }
+    }
+}
+
+impl Reload for Reloader {
+    /// Reads the file and does what has changed in it, or with `dry_run` only says what that would be: one sentence each. The
+    /// whole file is read and checked first.
+    ///
+    /// A drive whose settings alone have changed keeps its task, its snapshot and its motor. One that is removed, or whose
+    /// line, address, family or options have changed, ends by its policy, as at the exit.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] with what is wrong in the file; the old configuration holds then. [`Failure::Drive`] when a motor
+    /// whose drive was removed may turn, and when only a part could be done: it says what holds then.
+    async fn reload(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
+        let mut config = self.0.config.lock().await;
+        let file = self.0.file.clone();
+        // A name of a server may have to be looked up.
+        let read = blocking(move || Config::load_workable(&file)).await;
+        let read = read.and_then(|new| no_new_doubt(&config, &new).map(|()| new));
+        if dry_run {
+            let changes = changes(&config, &read?);
+            return Ok(changes.iter().map(|change| change.would_be(&self.0.plant.fleet())).collect());
+        }
+        self.take(&mut config, read).await
+    }
+}
+
+/// Reads on a thread that may wait.
+async fn blocking<T: Send + 'static>(
+    read: impl FnOnce() -> Result<T, Failure> + Send + 'static,
+) -> Result<T, Failure> {
+    let read = tokio::task::spawn_blocking(read).await;
+    read.unwrap_or_else(|_| Err(Failure::Input("the file could not be read".to_owned())))
+}
+
+fn no_new_doubt(config: &Config, new: &Config) -> Result<(), Failure> {
+    match config.new_doubt(new) {
+        Some(doubt) => Err(Failure::Input(format!("a new name: {doubt}"))),
+        None => Ok(()),
     }
 }
 

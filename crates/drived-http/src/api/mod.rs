@@ -15,6 +15,7 @@ mod read;
 mod reload;
 mod routes;
 mod selected;
+pub mod setup;
 mod stream;
 #[cfg(test)]
 mod testing;
@@ -37,7 +38,7 @@ pub use self::{
 use self::{
     demo::Stage,
     problem::Problem,
-    routes::{Route, demo_routes, door_routes, reload_routes, routes},
+    routes::{Route, demo_routes, door_routes, reload_routes, routes, setup_routes},
 };
 use drived_plant::plant::Plant;
 
@@ -49,6 +50,7 @@ const LARGEST_BODY: usize = 64 << 10;
 pub fn router(plant: Plant) -> Router {
     let mut all = routes();
     all.extend(reload_routes());
+    all.extend(setup_routes());
     of(all, plant)
 }
 
@@ -61,7 +63,9 @@ pub fn demo_router(plant: Plant, stage: Stage) -> Router {
 
 /// The description of a daemon's API.
 pub fn described() -> serde_json::Value {
-    document::of(&[routes(), reload_routes(), door_routes()].into_iter().flatten().collect::<Vec<_>>())
+    document::of(
+        &[routes(), reload_routes(), setup_routes(), door_routes()].into_iter().flatten().collect::<Vec<_>>(),
+    )
 }
 
 fn of(mut routes: Vec<Route>, plant: Plant) -> Router {

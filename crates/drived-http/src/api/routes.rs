@@ -15,10 +15,12 @@ use super::{
     parameter::{self, NewValue},
     past, read, reload,
     selected::Selected,
+    setup::{self, SetupChanges, SetupView},
     stream,
 };
 use drived_doors::{
-    LOGIN, LOGOUT, LoginBody, MadeToken, NewToken, RemovedToken, Rotation, SessionView, TOKENS, TokensView,
+    LINKS, LOGIN, LOGOUT, LoginBody, MadeLink, MadeToken, NewLink, NewToken, RemovedToken, Rotation,
+    SessionView, TOKENS, TokensView,
 };
 use drived_plant::plant::{
     Plant,
@@ -203,9 +205,12 @@ pub(super) fn door_routes() -> Vec<Route> {
         route.problems.extend([413, 415]);
         route
     };
-    let mut login = post(LOGIN, "Begins a session by a token; the answer sets its cookie")
-        .or_problem(429)
-        .or_problem(503);
+    let mut login = post(
+        LOGIN,
+        "Begins a session by a token, or by a code that is good once; the answer sets its cookie",
+    )
+    .or_problem(429)
+    .or_problem(503);
     login.body = Some(SchemaGenerator::subschema_for::<LoginBody>);
     let on_socket = |mut route: Route| {
         route.problems.extend([404, 413, 415, 422, 503]);
@@ -216,6 +221,15 @@ pub(super) fn door_routes() -> Vec<Route> {
             .answers::<MadeToken>(200, "what it is, told this once"),
     );
     new.body = Some(SchemaGenerator::subschema_for::<NewToken>);
+    let mut link = on_socket(
+        Route::elsewhere(
+            Method::POST,
+            LINKS,
+            "Makes a link by which a browser begins a session, over the control socket",
+        )
+        .answers::<MadeLink>(200, "the link, told this once"),
+    );
+    link.body = Some(SchemaGenerator::subschema_for::<NewLink>);
     let removed = "/api/v1/tokens/{name}";
     let mut other = on_socket(
         Route::elsewhere(
@@ -235,6 +249,7 @@ pub(super) fn door_routes() -> Vec<Route> {
                 .answers::<TokensView>(200, "their names and roles"),
         ),
         new,
+        link,
         on_socket(
             Route::elsewhere(Method::DELETE, removed, "Removes a token, over the control socket")
                 .answers::<RemovedToken>(200, "it is no more"),
@@ -250,6 +265,42 @@ pub(super) fn reload_routes() -> Vec<Route> {
             .with_query(DRY_RUN);
     route.problems.extend([413, 415, 422, 500]);
     vec![route]
+}
+
+/// How drives come into a program with a configuration.
+pub(super) fn setup_routes() -> Vec<Route> {
+    fn post<B: JsonSchema, A: JsonSchema>(
+        path: &'static str,
+        about: &'static str,
+        told: &'static str,
+    ) -> Route {
+        let mut route = Route::elsewhere(Method::POST, path, about).answers::<A>(200, told);
+        route.body = Some(SchemaGenerator::subschema_for::<B>);
+        route.problems.extend([413, 415, 422, 500]);
+        route
+    }
+    let view = "ports, families, the scan that is under way or was last, and the drives that were added";
+    let done = "what was done, a sentence each";
+    vec![
+        Route::elsewhere(Method::GET, setup::PATH, "How the first hour stands")
+            .answers::<SetupView>(200, view),
+        post::<setup::ScanWanted, SetupView>(
+            setup::SCAN,
+            "Begins to scan a port; nothing is written by it",
+            view,
+        ),
+        post::<Plain, SetupView>(setup::CANCEL, "Gives up the scan that is under way", view),
+        post::<setup::DrivesWanted, SetupChanges>(
+            setup::DRIVES,
+            "Takes drives up, to be watched, and writes them down",
+            done,
+        ),
+        post::<setup::ControlWanted, SetupChanges>(
+            setup::CONTROL,
+            "Has commands taken for a drive that was added, or not any more",
+            done,
+        ),
+    ]
 }
 
 /// What was, where a history is kept.

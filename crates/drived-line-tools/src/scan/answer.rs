@@ -91,16 +91,33 @@ impl Answer {
         }
     }
 
+    /// What is there, in one word.
+    pub(super) fn verdict(&self) -> &'static str {
+        match self {
+            Self::Damaged(_) => "damaged",
+            Self::Slave(alike) if alike.is_empty() => "unknown_slave",
+            Self::Slave(_) => "drive",
+            Self::Two { finding, .. } => finding.defect.name(),
+        }
+    }
+
+    /// What it could be.
+    pub(super) fn alike(&self) -> &[Likeness] {
+        match self {
+            Self::Damaged(_) => &[],
+            Self::Slave(alike) | Self::Two { alike, .. } => alike,
+        }
+    }
+
     /// For a program.
     pub(super) fn object(&self) -> Value {
-        let (verdict, alike, why) = match self {
-            Self::Damaged(why) => ("damaged", &[][..], Some(why.clone())),
-            Self::Slave(alike) if alike.is_empty() => ("unknown_slave", &[][..], None),
-            Self::Slave(alike) => ("drive", &alike[..], None),
-            Self::Two { alike, finding } => (finding.defect.name(), &alike[..], Some(finding.to_string())),
+        let why = match self {
+            Self::Damaged(why) => Some(why.clone()),
+            Self::Slave(_) => None,
+            Self::Two { finding, .. } => Some(finding.to_string()),
         };
-        let families: Vec<Value> = alike.iter().map(Likeness::object).collect();
-        let mut object = json!({ "verdict": verdict, "families": families });
+        let families: Vec<Value> = self.alike().iter().map(Likeness::object).collect();
+        let mut object = json!({ "verdict": self.verdict(), "families": families });
         if let (Some(why), Some(object)) = (why, object.as_object_mut()) {
             object.insert("why".to_owned(), json!(why));
         }

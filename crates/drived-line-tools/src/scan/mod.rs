@@ -9,6 +9,7 @@ mod save;
 mod sweep;
 #[cfg(test)]
 mod tests;
+pub mod told;
 
 use std::{path::PathBuf, time::Duration};
 
@@ -111,7 +112,10 @@ pub async fn scan(what: &What, save: Option<Save>, is_json: bool) -> Result<(), 
     let mut sweep = Sweep::new(&plan, line.clone(), what.wait.0, own_line::open_line);
     what.announce(&line, &plan, is_json)?;
     tokio::select! {
-        is_shared = listen_first(&line) => sweep.is_shared = is_shared,
+        heard = listen_first(&line) => {
+            sweep.is_shared = heard.is_some();
+            heard.into_iter().for_each(output::complain);
+        }
         () = ending.asked() => return Ok(()),
     }
     let began = Instant::now();
@@ -160,13 +164,14 @@ pub async fn scan(what: &What, save: Option<Save>, is_json: bool) -> Result<(), 
     }
 }
 
-/// Hears whether somebody else asks on this line before anything is asked: his questions and ours would destroy each other.
-async fn listen_first(line: &LineConfig) -> bool {
+/// Hears whether somebody else asks on this line before anything is asked, and says so: his questions and ours would destroy each
+/// other.
+async fn listen_first(line: &LineConfig) -> Option<String> {
     if !line.protocol.is_paced() {
-        return false;
+        return None;
     }
     // A port that cannot be listened to is told of when it is asked.
-    let Ok(mut listener) = Listener::open(line).await else { return false };
+    let mut listener = Listener::open(line).await.ok()?;
     let mut requests = 0_u32;
     let listening = async {
         while let Ok(Some(heard)) = listener.next().await {
@@ -175,13 +180,12 @@ async fn listen_first(line: &LineConfig) -> bool {
         std::future::pending::<()>().await;
     };
     let _ = tokio::time::timeout(LISTENING, listening).await;
-    if requests > 0 {
-        output::complain(format_args!(
+    (requests > 0).then(|| {
+        format!(
             "somebody else asks on this line: {requests} requests in {LISTENING:?}. This scan disturbs him, and he it: end his \
              asking first, then scan again"
-        ));
-    }
-    requests > 0
+        )
+    })
 }
 
 impl What {

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use drived_config::config::{DrivePart, LinePart, drive_keys};
 use drived_face::Meaning;
-use drived_file::Config;
+use drived_file::{Config, added::Added};
 use drived_words::{
     drive_spec::{self, DriveName},
     failure::Failure,
@@ -36,7 +36,11 @@ const CLOSING: Duration = Duration::from_secs(10);
 const PACKAGED: Duration = Duration::from_secs(90);
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let config = Config::load_workable(&args.config)?;
+    // A file that is there may have no drive yet: they can be added at the page.
+    let config = match args.config.exists() {
+        true => Config::load_to_begin(&args.config)?,
+        false => Config::load_workable(&args.config)?,
+    };
     for (_, face) in &config.faces {
         // What it needs is read as the daemon would.
         face.check()?;
@@ -66,6 +70,9 @@ fn object(file: &Path, config: &Config) -> Value {
         "lines": config.lines.iter().map(line).collect::<Vec<_>>(),
         "doubts": config.doubts(),
         "state": config.doors.state.folder,
+        "added": config.added.as_ref().filter(|added| added.text.is_some()).map(|added| json!({
+            "file": added.file, "holds": !added.is_aside,
+        })),
         "timeout_stop_s": (config.shutdown + CLOSING).as_secs(),
     });
     for (key, meaning) in config.faces.iter().flat_map(|(_, face)| face.object()) {
@@ -103,6 +110,9 @@ fn tell(file: &Path, config: &Config) -> Result<(), Failure> {
         let audit = if config.doors.state.audit.is_some() { "" } else { "; no audit log is kept" };
         output::say(format_args!("kept in {}{audit}", folder.display()))?;
     }
+    for text in config.added.iter().filter_map(|added| added_text(file, config, added)) {
+        output::say(text)?;
+    }
     for doubt in config.doubts() {
         output::say(format_args!("DOUBTFUL: {doubt}"))?;
     }
@@ -121,6 +131,21 @@ fn tell(file: &Path, config: &Config) -> Result<(), Failure> {
         "{} is a configuration that can work; drived plan --config {0} calculates its lines",
         file.display()
     ))
+}
+
+/// Which of the two files with drives holds.
+fn added_text(file: &Path, config: &Config, added: &Added) -> Option<String> {
+    let (name, theirs) = (file.display(), added.file.display());
+    match (added.aside(file), &added.text) {
+        (Some(aside), _) => Some(format!("NOT READ: {aside}")),
+        (None, _) if config.lines.is_empty() => {
+            Some(format!("no drive yet: those that are added at the page are written to {theirs}"))
+        }
+        (None, Some(_)) if !added.is_aside => {
+            Some(format!("the drives are those of {theirs}, added at the page: {name} has none of its own"))
+        }
+        _ => None,
+    }
 }
 
 /// Drives with the same settings, and the first of them.

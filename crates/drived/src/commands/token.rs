@@ -8,7 +8,7 @@ use drived_client::Daemon;
 use drived_doors::{
     config::DoorsConfig,
     {
-        Caller, MadeToken, RemovedToken, Rights, Role, Scope, TOKENS, TokensView, added,
+        Caller, LINKS, MadeLink, MadeToken, RemovedToken, Rights, Role, Scope, TOKENS, TokensView, added,
         audit::{self, Kind, Record},
         of_days, of_hours, replaced,
         tokens::{TokenView, Tokens},
@@ -43,6 +43,23 @@ pub(crate) enum Command {
         /// For how many days it is good; for ever unless it is said
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=3_660))]
         days: Option<u32>,
+        #[command(flatten)]
+        place: PlaceArgs,
+        #[command(flatten)]
+        json: JsonArgs,
+    },
+    /// Make a link by which a browser is known at the page of the running daemon, without a token that is typed: good once, for ten
+    /// minutes; the session it begins lasts twelve hours
+    Link {
+        /// By whose name and rights: a token, which is made when the link is used if there is none
+        #[arg(value_name = "NAME")]
+        name: String,
+        /// What a token that is made may; one that is there keeps its role
+        #[arg(long, value_enum)]
+        role: Option<Role>,
+        /// For how many days a token that is made is good
+        #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=3_660))]
+        days: u32,
         #[command(flatten)]
         place: PlaceArgs,
         #[command(flatten)]
@@ -161,6 +178,19 @@ pub(crate) async fn run(command: Command) -> Result<(), Failure> {
                 Way::Files(files) => files.rotate(&name, hours)?,
             };
             json.say(|| json!(made), || output::say_as_it_is(&made.token))
+        }
+        Command::Link { name, role, days, place, json } => {
+            let Way::Daemon(mut daemon) = open(&place).await? else {
+                return Err(Failure::Input(
+                    "no daemon runs: a link is to the page of one that does".to_owned(),
+                ));
+            };
+            let mut asked = json!({ "name": name, "days": days });
+            if let Some(role) = role {
+                asked["role"] = role.name().into();
+            }
+            let made: MadeLink = daemon.post(LINKS, &asked).await?.done()?;
+            json.say(|| json!(made), || output::say_as_it_is(&made.link))
         }
         Command::List { place, json } => {
             let tokens = match open(&place).await? {

@@ -9,6 +9,7 @@ import { MISSING, old, quantity } from './format.js';
 import { givenBy, lastSetpoint } from './given.js';
 import { age, plant, quality, takeDrive } from './plant.js';
 import { named, t } from './texts.js';
+import { told } from './told.js';
 import { trend } from './trend.js';
 import { trouble } from './trouble.js';
 import { word } from './vocabulary.js';
@@ -43,6 +44,8 @@ export function drive(root, name) {
     el('div', {}, el('h1', { tabindex: -1 }, name), place),
     el('p.state', {}, el('span.mark', { 'aria-hidden': 'true' }), state, turns), freshness);
   const remark = el('p.remark');
+  const gaps = el('ul');
+  const notKnown = el('details.panel', { hidden: true }, el('summary', {}, t('not_known_of')), gaps);
   const big = BIG.map(([text]) => el('div', {}, el('dt', {}, t(text)), el('dd.number'), el('dd.since')));
   const given = big[1].appendChild(el('dd.since'));
   let setpoint = setpointText(setpointOf(shown));
@@ -50,7 +53,7 @@ export function drive(root, name) {
   const fault = faultPanel(name);
   const orders = ordersPanel(name);
   const tables = tablesPanel(name);
-  root.append(head, remark, fault.element, el('dl.big', {}, ...big),
+  root.append(head, remark, fault.element, notKnown, el('dl.big', {}, ...big),
     el('div.columns', {}, trendPlace, orders.element), tables.element);
   const curve = trend(trendPlace, name);
   update(new Set(['state']));
@@ -93,6 +96,9 @@ export function drive(root, name) {
     const said = shown.fault || status.state === 'fault' ? '' : [text, first].filter(Boolean).join(' – ');
     setText(remark, said);
     remark.hidden = !said;
+    const unseen = shown.not_known ?? [];
+    notKnown.hidden = !unseen.length;
+    if (gaps.childElementCount !== unseen.length) gaps.replaceChildren(...unseen.map(one => el('li', { lang: 'en' }, told(one))));
     BIG.forEach(([, value, of], index) => {
       const group = groupOf(of);
       setText(big[index].children[1], value(shown));

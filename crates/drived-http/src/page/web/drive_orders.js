@@ -15,7 +15,6 @@ import { word } from './vocabulary.js';
 import { setpointOf } from './words.js';
 
 const STOPS = ['ramp', 'fast', 'freewheel', 'dc_injection'];
-const EXPIRES_MS = 5_000;
 const SHOWN = 6;
 
 /** The panel of commands of the drive `name`: `element`, `update(drive)`, `end()`. */
@@ -71,8 +70,7 @@ export function ordersPanel(name) {
   }
 
   function order(action, body = {}) {
-    const expiry = action === 'stop' ? {} : { expires_in_ms: EXPIRES_MS };
-    return command(name, action, path('drives', name, action), { ...expiry, ...body });
+    return command(name, action, path('drives', name, action), body);
   }
 
   function writeLatest() {

@@ -21,6 +21,10 @@ const VIEWS = {
   lines: async () => (await import('./line.js')).lines,
   line: async () => (await import('./line.js')).line,
   events: async () => (await import('./events.js')).events,
+  at: async () => (await import('./at.js')).at,
+  past: async () => (await import('./past.js')).past,
+  setup: async () => (await import('./setup.js')).setup,
+  enter: async () => (await import('./enter.js')).enter,
 };
 /** So long the first look has the network for itself. */
 const AFTER_MS = 1_500;
@@ -103,9 +107,9 @@ async function open() {
   view = show(root, argument, Boolean(left));
   for (const link of document.querySelectorAll('nav a')) {
     const [, own] = link.getAttribute('href').split(/[/?]/);
-    setAttribute(link, 'aria-current', own === name || (own === 'lines' && name === 'line') ? 'page' : false);
+    setAttribute(link, 'aria-current', own === name || (own === 'lines' && name === 'line') || (own === 'events' && ['at', 'past'].includes(name)) ? 'page' : false);
   }
-  shownAt = [argument || (VIEWS[name] && name ? t(name) : ''), 'drived'].filter(Boolean).join(' – ');
+  shownAt = [(name !== 'enter' && argument) || (VIEWS[name] && name ? t(name) : ''), 'drived'].filter(Boolean).join(' – ');
   writeFrame();
   if (left) scrollBack(root, left);
   else if (!first) {

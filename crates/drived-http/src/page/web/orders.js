@@ -20,6 +20,8 @@ const LOOK_AGAIN_MS = 1_000;
 const ATTEMPT_MS = 2_000;
 const AGAIN_MS = 500;
 const GIVE_UP_MS = 60_000;
+/** What comes to a drive later than this is nobody's wish any more. */
+const EXPIRES_MS = 5_000;
 
 const orders = [];
 const listeners = new Set();
@@ -35,9 +37,10 @@ export function onOrder(listener) {
   return () => listeners.delete(listener);
 }
 
-/** Gives a command at this address, and ends when its outcome is known; what becomes of it later is told all the same. */
-export function command(to, action, where, body = {}) {
+/** Gives a command at this address, and ends when its outcome is known; what becomes of it later is told all the same. All but a stop expire. */
+export function command(to, action, where, asked = {}) {
   const id = commandId();
+  const body = action === 'stop' ? asked : { expires_in_ms: EXPIRES_MS, ...asked };
   const within = action === 'stop' ? ATTEMPT_MS : undefined;
   return carryOut(to, action, () => post(`${where}?wait=0`, { id, ...body }, 'POST', within), id);
 }

@@ -66,7 +66,9 @@ export function overview(root, _, isBack) {
   const several = severalPanel();
   const body = el('div.rows', { role: 'rowgroup' });
   const wall = el('div.wall', { hidden: true });
-  const nothing = el('p.hint', { hidden: true });
+  const said = el('span');
+  const begin = el('a.button', { href: '#/setup' }, t('setup'));
+  const nothing = el('p.nothing', { hidden: true }, said, ' ', begin);
   const allBox = el('input', { type: 'checkbox', 'aria-label': t('select_all'), onchange: () => chooseShown(allBox.checked) });
   const heads = new Map(COLUMNS.map(name => [name, el(`div.${name}`, { role: 'columnheader' },
     isSortable(name) ? el('button', { type: 'button', onclick: () => ask({ sort: asked.sort === name ? `-${name}` : asked.sort === `-${name}` ? '' : name }) }, t(name)) : t(name))]));
@@ -120,7 +122,9 @@ export function overview(root, _, isBack) {
     if (isWall) showWall();
     else showList();
     nothing.hidden = shown.length > 0;
-    setText(nothing, t(plant.drives.size ? 'nothing_found' : 'no_drives'));
+    setText(said, t(plant.drives.size ? 'nothing_found' : 'no_drives'));
+    begin.hidden = plant.drives.size > 0;
+    list.hidden ||= !plant.drives.size;
     writeOrders(inGroup, members);
   }
 

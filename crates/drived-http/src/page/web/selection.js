@@ -7,7 +7,6 @@ import { command } from './orders.js';
 import { mayCommand, plant } from './plant.js';
 import { t } from './texts.js';
 
-const EXPIRES_MS = 5_000;
 const NAMED = 12;
 const STEP_HZ = 0.1;
 
@@ -66,8 +65,7 @@ export function selectionBar(chosen, changed) {
   }
 
   function give(action, body = {}, names = fitting(action)) {
-    const expiry = action === 'stop' ? {} : { expires_in_ms: EXPIRES_MS };
-    command(t('selected', { count: names.length }), action, `selected/${action}`, { drives: names, ...expiry, ...body });
+    command(t('selected', { count: names.length }), action, `selected/${action}`, { drives: names, ...body });
   }
 
   async function askStart() {

@@ -85,7 +85,8 @@ const TABLE = {
   given_since: ['since {time}', 'depuis {time}'],
   given_by: ['by {who}, {time}', 'par {who}, {time}'],
   given_by_now: ['{who} set {value}', '{who} a réglé {value}'],
-  no_drives: ['No drive is configured yet. On this host, drived scan --line PORT,19200,8E1 --save drives.toml finds those of a port and writes them down, only read; then drived reload. Nothing is written to a drive by it.', 'Aucun variateur n’est encore configuré. Sur cet hôte, drived scan --line PORT,19200,8E1 --save drives.toml trouve ceux d’un port et les note, en lecture seule ; ensuite drived reload. Rien n’est écrit dans un variateur.'],
+  no_drives: ['No drive is configured yet. They are found on a port and added here; nothing is written to a drive by it.', 'Aucun variateur n’est encore configuré. On les trouve sur un port et les ajoute ici ; rien n’est écrit dans un variateur.'],
+  setup: ['Add drives', 'Ajouter des variateurs'],
 
   // The alarms.
   alarm_line_away: ['the port of the line is away, none of its drives can be reached', 'le port de la ligne est absent, aucun de ses variateurs n’est joignable'],
@@ -154,6 +155,7 @@ const TABLE = {
   fault_number: ['fault {code}', 'défaut {code}'],
 
   // One drive.
+  not_known_of: ['What its file cannot tell of this drive', 'Ce que son fichier ne peut dire de ce variateur'],
   unknown_drive: ['There is no drive of that name.', 'Aucun variateur de ce nom.'],
   line_of: ['line {line}, slave {slave}, {family}', 'ligne {line}, esclave {slave}, {family}'],
   torque: ['Torque', 'Couple'],
@@ -330,6 +332,11 @@ let column = LANGUAGES.indexOf(document.documentElement.lang);
 /** The language, as in `lang` attributes. */
 export function language() {
   return LANGUAGES[column];
+}
+
+/** Adds the texts of a view that comes later. */
+export function addTexts(texts) {
+  Object.assign(TABLE, texts);
 }
 
 /** The text of this name, with `{names}` filled in. */

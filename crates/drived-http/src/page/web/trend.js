@@ -3,7 +3,9 @@
 import { path, read } from './api.js';
 import { el, setText, table } from './dom.js';
 import { clock, plainTime, quantity, zoneAt } from './format.js';
+import { ofPast } from './past_links.js';
 import { daemonNow } from './plant.js';
+import { axis, colour, loadPlotter, timeAxis, upTo } from './plot.js';
 import { t } from './texts.js';
 import { told } from './told.js';
 
@@ -41,7 +43,8 @@ export function trend(root, name) {
   const said = el('p.hint', {}, t('trend_hint', { zone: zoneAt() }));
   const rows = el('div.wide');
   const asTable = el('details', { ontoggle: writeTable }, el('summary', {}, t('trend_table')), rows);
-  root.append(el('div.headline', {}, el('h2', {}, t('trend')), el('span.chips', {}, ...windows, pause)), canvas, said, asTable);
+  root.append(el('div.headline', {}, el('h2', {}, t('trend')), el('span.chips', {}, ...windows, pause)), canvas, said,
+    el('p', {}, el('a', { href: ofPast([name]) }, t('past'))), asTable);
   const dark = matchMedia('(prefers-color-scheme: dark)');
   dark.addEventListener('change', draw);
   const resized = new ResizeObserver(() => plots.forEach((plot, index) =>
@@ -141,9 +144,9 @@ export function trend(root, name) {
     const together = { cursor: { sync: { key: `trend ${name}` }, drag: { x: true, y: false } },
       hooks: { setSelect: [plot => plot.select.width > 0 && hold({ min: plot.posToVal(plot.select.left, 'x'), max: plot.posToVal(plot.select.left + plot.select.width, 'x') })] } };
     plots = [
-      new window.uPlot({ width, height: HEIGHTS[0], padding: [null, 52, null, null], ...together, series: [timeSeries(), series(0), series(1)], axes: [timeAxis(), axis('Hz')],
+      new window.uPlot({ width, height: HEIGHTS[0], padding: [null, 52, null, null], ...together, series: [timeSeries(), series(0), series(1)], axes: [timeAxis(plainTime), axis('Hz')],
         scales: { Hz: { range: upTo(10) } } }, columnsOf(0), canvas),
-      new window.uPlot({ width, height: HEIGHTS[1], ...together, series: [timeSeries(), series(2), series(3)], axes: [timeAxis(), axis('A'), axis('%', 1)],
+      new window.uPlot({ width, height: HEIGHTS[1], ...together, series: [timeSeries(), series(2), series(3)], axes: [timeAxis(plainTime), axis('A'), axis('%', 1)],
         scales: { A: { range: upTo(1) }, '%': { range: upTo(100) } } }, columnsOf(1), canvas),
     ];
     follow();
@@ -159,25 +162,6 @@ export function trend(root, name) {
   }
 }
 
-let plotter;
-
-/** Loads the chart's code when the first trend is looked at. */
-function loadPlotter() {
-  plotter ??= new Promise((loaded, failed) => {
-    document.head.append(el('link', { rel: 'stylesheet', href: 'vendor/uplot.css' }),
-      el('script', { src: 'vendor/uplot.js', onload: loaded, onerror: () => failed(new Error('uplot.js')) }));
-  });
-  return plotter;
-}
-
-function colour(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-}
-
-function font() {
-  return `12px ${getComputedStyle(document.documentElement).fontFamily}`;
-}
-
 function timeSeries() {
   return { label: t('time'), value: (_, seconds) => (seconds ? clock(seconds * 1000) : '—') };
 }
@@ -186,19 +170,4 @@ function series(index) {
   const { text, unit, digits, colour: name, dash } = COLUMNS[index];
   return { label: t(text), scale: unit, stroke: colour(name), width: 1.6, dash, spanGaps: false, points: { show: false },
     value: (_, value) => quantity(value, digits, unit) };
-}
-
-function axis(scale, side = 3) {
-  return { scale, side, size: 52, font: font(), stroke: colour('--ink-soft'), grid: { show: side === 3, stroke: colour('--edge'), width: 1 },
-    ticks: { stroke: colour('--edge') }, values: (_, ticks) => ticks.map(value => quantity(value, Number.isInteger(value) ? 0 : 1, scale)) };
-}
-
-function timeAxis() {
-  return { font: font(), stroke: colour('--ink-soft'), grid: { stroke: colour('--edge'), width: 1 }, ticks: { stroke: colour('--edge') }, space: 80,
-    values: (_, ticks) => ticks.map(seconds => plainTime(seconds * 1000)) };
-}
-
-/** From zero to the largest value, at least `least`, so that noise is not shown as a movement. */
-function upTo(least) {
-  return (_, min, max) => [Math.min(0, min ?? 0), Math.max(least, (max ?? 0) * 1.1)];
 }

@@ -139,6 +139,11 @@ const WORDS = {
   clock_stepped: ['Clock stepped', 'Horloge recalée'],
   audit_log: ['Audit log', 'Journal d’audit'],
   history: ['History', 'Historique'],
+  began: ['Daemon begins', 'Début du service'],
+  began_after_kill: ['Daemon begins, was killed', 'Début du service, qui avait été tué'],
+  ended: ['Daemon ends', 'Fin du service'],
+  hole: ['Not recorded', 'Non enregistré'],
+  stream_anew: ['Read anew', 'Relu'],
 };
 
 /** The plain word for a word of the API; words that are not in the table stand for themselves. */

@@ -25,7 +25,8 @@ use drived_words::{failure::Failure, output, signals::Ending};
 /// be written
 ///
 /// Only what differs is written, each at standstill and read back. One that the drive refuses is passed over, and told with its
-/// reason at the end (exit code 1); who commands the drive, and the line's own settings, stay as they are then. A drive that does
+/// reason at the end (exit code 1), as is one that could not be read, when it was kept or now: it is named as missing, and not written.
+/// Who commands the drive, and the line's own settings, stay as they are then, and nothing is saved. A drive that does
 /// not answer, or that runs, ends it; running it again goes on from there. Limits that belong together (low speed, high speed,
 /// highest frequency) are kept in their order at every moment of the way. Through the daemon it needs the right to change
 /// parameters.

@@ -1,0 +1,161 @@
+//! The drives that are added at the page: a file of the state folder with lines and drives alone, which the daemon may write and a
+//! person can read and change. It holds as long as the configuration has no line and no drive of its own.
+
+use std::{
+    fmt::Write as _,
+    ops::Range,
+    path::{Path, PathBuf},
+};
+
+use toml::{
+    Spanned,
+    de::{DeTable, DeValue},
+};
+
+use drived_config::kept::{Kept, Readers};
+use drived_words::drive_spec::DriveName;
+
+/// The file of the state folder.
+pub const FILE: &str = "added.toml";
+
+/// Where drives are added, and whether those that stand there hold.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Added {
+    pub file: PathBuf,
+    /// The configuration has lines or drives of its own: it alone holds.
+    pub is_aside: bool,
+    /// What stands in it; `None`: there is none.
+    pub text: Option<String>,
+}
+
+impl Added {
+    /// What is said where its drives do not hold although they are there; `None`: they do, or there are none.
+    pub fn aside(&self, configuration: &Path) -> Option<String> {
+        let Self { file, is_aside, text } = self;
+        (*is_aside && text.is_some()).then(|| {
+            format!(
+                "the drives of {} do not hold: {} has drives of its own, and then it alone does",
+                file.display(),
+                configuration.display()
+            )
+        })
+    }
+
+    /// Replaces the file in one step.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn write(&self, text: &str) -> std::io::Result<()> {
+        Kept::at(&self.file).replace(text.as_bytes(), Readers::Others)
+    }
+}
+
+/// A drive that is added.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NewDrive {
+    pub drive: DriveName,
+    pub name: String,
+    /// Whether it has said itself what it is.
+    pub is_certain: bool,
+}
+
+/// The text with a line, unless it has one of this name, and these drives on it, which are only read.
+pub fn with_drives(text: Option<&str>, (line, port): (&str, &str), drives: &[NewDrive]) -> String {
+    let mut text = text.map_or_else(|| HEAD.to_owned(), str::to_owned);
+    if !text.is_empty() && !text.ends_with('\n') {
+        text.push('\n');
+    }
+    let line = quoted(line);
+    let is_there = DeTable::parse(&text).is_ok_and(|tables| {
+        let lines = tables.get_ref().get("lines").and_then(|lines| lines.get_ref().as_table());
+        lines.is_some_and(|lines| lines.keys().any(|name| quoted(name.get_ref()) == line))
+    });
+    if !is_there {
+        let _ = write!(text, "\n[lines.{line}]\nport = {}\n", quoted(port));
+    }
+    for NewDrive { drive, name, is_certain } in drives {
+        let known = if *is_certain { "By its own words." } else { "A GUESS: see its nameplate." };
+        let _ = write!(
+            text,
+            "\n# {known}\n[[drives]]\nline = {line}\ndrive = {}\nname = {}\n# true: commands may be given to it, and its policies act.\n\
+             control = false\n",
+            quoted(&drive.to_string()),
+            quoted(name)
+        );
+    }
+    text
+}
+
+/// The text with another word for whether a drive takes commands; everything else stays as it stands. `None`: no entry of the file is
+/// of this drive alone.
+pub fn with_control(text: &str, name: &str, control: bool) -> Option<String> {
+    let tables = DeTable::parse(text).ok()?;
+    let drives = tables.get_ref().get("drives")?.get_ref().as_array()?;
+    let entry = drives.iter().find_map(|drive| {
+        let table = drive.get_ref().as_table()?;
+        (text_of(table.get("name")?) == Some(name)).then_some(table)
+    })?;
+    let (at, new): (Range<usize>, String) = match entry.get("control") {
+        Some(said) => (said.span(), control.to_string()),
+        None => {
+            let end = entry.get("name")?.span().end;
+            (end..end, format!("\ncontrol = {control}"))
+        }
+    };
+    let mut text = text.to_owned();
+    text.replace_range(at, &new);
+    Some(text)
+}
+
+fn text_of<'a>(value: &'a Spanned<DeValue<'_>>) -> Option<&'a str> {
+    value.get_ref().as_str()
+}
+
+/// What stands above all.
+const HEAD: &str = "# Drives that were added at the page of drived. A person may change this file: drived reload reads it again.\n\
+    # It holds as long as the configuration that drived was started with has no [lines] and no [[drives]] of its own.\n";
+
+/// A text as a value or a key of TOML.
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drive(address: u8, name: &str) -> NewDrive {
+        let spec: drived_words::drive_spec::DriveSpec = format!("atv312@{address}").parse().unwrap();
+        NewDrive { drive: spec.single().unwrap(), name: name.to_owned(), is_certain: address == 1 }
+    }
+
+    #[test]
+    fn what_is_added_is_only_read_and_stands_below_what_was_there() {
+        let line = ("hall \"2\"", "/dev/ttyUSB0,19200,8E1");
+        let first = with_drives(None, line, &[drive(1, "pump")]);
+        assert!(
+            first.starts_with("# Drives that were added at the page") && first.contains("By its own words.")
+        );
+        let both = with_drives(Some(&first), line, &[drive(2, "Lüfter = 2")]);
+        assert!(both.starts_with(&first) && both.contains("A GUESS"), "{both}");
+        let read: toml::Table = both.parse().unwrap();
+        assert_eq!(read["lines"].as_table().unwrap().len(), 1);
+        assert_eq!(read["lines"]["hall \"2\""]["port"].as_str(), Some("/dev/ttyUSB0,19200,8E1"));
+        let drives = read["drives"].as_array().unwrap();
+        assert_eq!(drives[1]["name"].as_str(), Some("Lüfter = 2"));
+        assert_eq!(drives[1]["drive"].as_str(), Some("atv312@2"));
+        assert!(drives.iter().all(|drive| drive["control"].as_bool() == Some(false)));
+    }
+
+    #[test]
+    fn control_of_one_drive_changes_one_word_and_nothing_of_what_a_person_has_written() {
+        let text = "# mine\n[lines.a]\nport = \"/dev/ttyUSB0\"\n[[drives]]\nname = \"one\"  # the first\nline = \"a\"\n\
+            drive = \"atv312@1\"\ncontrol = false # for now\n[[drives]]\nline=\"a\"\ndrive=\"atv312@2\"\nname=\"two\"\n";
+        let taken = with_control(text, "one", true).unwrap();
+        assert_eq!(taken, text.replace("control = false # for now", "control = true # for now"));
+        assert_eq!(with_control(&taken, "one", false).as_deref(), Some(text));
+        let other = with_control(text, "two", true).unwrap();
+        assert_eq!(other, text.replace("name=\"two\"\n", "name=\"two\"\ncontrol = true\n"));
+        assert_eq!(with_control(text, "three", true), None);
+    }
+}

@@ -1,0 +1,82 @@
+// The drives that were added here: how they are now, and for which of them commands are taken.
+
+import { confirmed } from './ask.js';
+import { el, setAttribute, setText } from './dom.js';
+import { old, MISSING } from './format.js';
+import { ofDrive } from './place.js';
+import { age, plant, quality } from './plant.js';
+import { t } from './texts.js';
+import { told } from './told.js';
+import { trouble } from './trouble.js';
+import { frequencyText, stateWord } from './words.js';
+
+/** The panel of the added drives; `change(drive, control)` has commands taken for one, or not. */
+export function addedPanel(change) {
+  const rows = new Map();
+  const list = el('div.added');
+  const element = el('section.panel.setup', { hidden: true, 'aria-label': t('setup_here') }, el('h2', {}, t('setup_here')), list);
+  return { element, show, update, tick: update };
+
+  function show(drives, may) {
+    element.hidden = !drives.length;
+    const names = drives.map(({ name }) => name);
+    for (const name of [...rows.keys()]) if (!names.includes(name)) rows.delete(name);
+    for (const one of drives) {
+      if (!rows.has(one.name)) rows.set(one.name, makeRow(one.name));
+      rows.get(one.name).show(one, may);
+    }
+    if (list.children.length !== rows.size || [...rows.values()].some(row => !row.element.isConnected)) list.replaceChildren(...names.map(name => rows.get(name).element));
+    update();
+  }
+
+  function update() {
+    for (const row of rows.values()) row.update();
+  }
+
+  function makeRow(name) {
+    let isControlled = false;
+    const state = el('b');
+    const note = el('small');
+    const frequency = el('span.number');
+    const fresh = el('span.age');
+    const takes = el('span.takes');
+    const button = el('button', { type: 'button', onclick: press });
+    const element = el('div.find', { 'data-name': name },
+      el('a', { href: ofDrive(name) }, name),
+      el('span.state', {}, el('span.mark', { 'aria-hidden': 'true' }), state, note), frequency, fresh, takes, button);
+    return { element, show, update };
+
+    function show(one, may) {
+      isControlled = one.control;
+      setText(takes, t(one.control ? 'setup_controlled' : 'setup_look'));
+      setText(button, t(one.control ? 'setup_give' : 'setup_control'));
+      setAttribute(button, 'aria-label', t(one.control ? 'setup_give_of' : 'setup_control_of', { drive: name }));
+      button.hidden = !may;
+    }
+
+    function update() {
+      const drive = plant.drives.get(name);
+      if (!drive) return;
+      const known = quality(drive.status);
+      const ms = age(drive.status, drive);
+      const worst = trouble(drive);
+      setAttribute(element, 'data-state', worst.severity === 'alarm' ? 'trouble' : drive.status?.state);
+      setAttribute(element, 'data-quality', known);
+      setText(state, stateWord(drive));
+      setText(note, worst.text);
+      setText(frequency, frequencyText(drive.status));
+      setText(fresh, known === 'good' ? t('live') : ms === undefined ? MISSING : old(ms));
+    }
+
+    async function press() {
+      const to = !isControlled;
+      const unseen = plant.drives.get(name)?.not_known ?? [];
+      const gaps = to && unseen.length ? el('div', {}, el('p', {}, t('not_known_of')), el('ul.history', {}, ...unseen.map(one => el('li', { lang: 'en' }, told(one))))) : undefined;
+      if (!await confirmed([name], t(to ? 'setup_confirm_control' : 'setup_confirm_give', { drive: name }), button.textContent, gaps)) return;
+      button.disabled = true;
+      await change(name, to);
+      button.disabled = false;
+      button.focus();
+    }
+  }
+}
