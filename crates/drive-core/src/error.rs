@@ -27,7 +27,7 @@ pub struct Exchange {
 impl Exchange {
     /// Whether it writes registers.
     const fn is_write(self) -> bool {
-        matches!(self.function, 0x06 | 0x10)
+        matches!(self.function, 0x05 | 0x06 | 0x0F | 0x10 | 0x17)
     }
 }
 
