@@ -1,6 +1,6 @@
 //! A profile as a family, for programs that choose drives by name. With the feature `families`.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use drive_core::Frequency;
 use drive_families::{Bit, Definition, OptionEntry, Options};
@@ -13,6 +13,7 @@ use crate::{
 const FULL_SCALE: &str = "full-scale";
 const HIGHEST: &str = "highest";
 const COMMANDS_ALONE: &str = "commands-alone";
+const WATCHDOG_TIME: &str = "watchdog-time";
 
 fn frequency(text: &str) -> Option<Frequency> {
     text.parse()
@@ -20,7 +21,16 @@ fn frequency(text: &str) -> Option<Frequency> {
         .filter(|frequency| (Frequency::from_hertz(1)..=Frequency::from_hertz(650)).contains(frequency))
 }
 
-static OPTIONS: [OptionEntry; 3] = [
+/// The time of a watchdog, such as `2s` or `500ms`.
+fn time(text: &str) -> Option<Duration> {
+    let milliseconds = match text.strip_suffix("ms") {
+        Some(number) => number.trim().parse().ok()?,
+        None => text.strip_suffix('s')?.trim().parse::<u64>().ok()?.checked_mul(1_000)?,
+    };
+    (100..=600_000).contains(&milliseconds).then(|| Duration::from_millis(milliseconds))
+}
+
+static OPTIONS: [OptionEntry; 4] = [
     OptionEntry::new(
         FULL_SCALE,
         "a frequency, such as 50Hz",
@@ -39,6 +49,12 @@ static OPTIONS: [OptionEntry; 3] = [
         "that nothing but this bus commands it, of a drive that does not tell: by it a fault is reset (default no)",
         &|text| matches!(text, "yes" | "no"),
     ),
+    OptionEntry::new(
+        WATCHDOG_TIME,
+        "a time, such as 2s or 500ms",
+        "the time of its communication watchdog, as it is set at the drive: it is fed then, where a command word alone feeds it too",
+        &|text| time(text).is_some(),
+    ),
 ];
 
 /// What its owner has said.
@@ -48,6 +64,7 @@ fn owner(options: &Options) -> Owner {
         full_scale: said(FULL_SCALE),
         highest: said(HIGHEST),
         commands_alone: options.get(COMMANDS_ALONE) == Some("yes"),
+        watchdog: options.get(WATCHDOG_TIME).and_then(time),
     }
 }
 

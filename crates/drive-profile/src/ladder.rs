@@ -136,8 +136,15 @@ impl<'a> Ladder<'a> {
         for name in ways {
             self.register(Level::Motion, name.get_ref());
         }
-        if let Some(direction) = see.direction.given() {
-            self.sound(Level::Motion, "which way it turns", &direction.get_ref().source);
+        match (&see.direction, &self.file.start.reverse) {
+            (Answer::Given(direction), _) => {
+                self.sound(Level::Motion, "which way it turns", &direction.get_ref().source);
+            }
+            (Answer::None, Answer::None) => {}
+            (Answer::None | Answer::Unknown, _) => self.warn(
+                "which way it turns cannot be seen, as far as is known",
+                "which bit tells it, or is the output signed?",
+            ),
         }
     }
 

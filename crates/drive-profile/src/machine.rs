@@ -122,7 +122,9 @@ impl Machine {
         let name = file.setpoint.given().map(|setpoint| setpoint.get_ref().register.get_ref());
         let Some(register) = name.and_then(|name| file.named(name)) else { return 0 };
         let held = file.place(register).and_then(|place| self.kept.get(&place)).copied().unwrap_or(0);
-        hertz(register).map_or(0, |[numerator, denominator]| hundredths(held.into(), numerator, denominator))
+        // A drive whose setpoint is its run command turns round by its sign; the run command says so already.
+        let counts = if register.signed { i64::from(held.cast_signed()).abs() } else { held.into() };
+        hertz(register).map_or(0, |[numerator, denominator]| hundredths(counts, numerator, denominator))
     }
 
     fn target(&self) -> i32 {
@@ -150,7 +152,12 @@ impl Machine {
         };
         // The last write of a start starts it, where what else it writes stands by now: a direction of its own.
         let ends = |start| {
-            let all = writes(start);
+            let mut all = writes(start);
+            let by_setpoint = start.given().is_some_and(|start| start.get_ref().starts_by_setpoint());
+            // Whatever setpoint it is, with the sign of this start.
+            if let Some(last) = all.last_mut().filter(|last| by_setpoint && alike(**last, written)) {
+                *last = written;
+            }
             all.last() == Some(&written) && all.iter().all(|of| self.stands(&all, *of))
         };
         if ends(&file.start.forward) {
@@ -219,10 +226,13 @@ impl Machine {
                 self.put(&mut words, name, FULL_SCALE.centihertz().into());
             }
         }
+        // The register that takes the setpoint holds it as it was written, with its sign.
+        let taken = file.setpoint.given().map(|setpoint| setpoint.get_ref().register.get_ref());
+        let other = |name: &&crate::format::Spanned<String>| self.local || Some(name.get_ref()) != taken;
         for (name, value) in [
             (see.output.given(), i64::from(output)),
             (
-                see.setpoint.given(),
+                see.setpoint.given().filter(other),
                 if self.local { i64::from(self.panel_reference.centihertz()) } else { self.setpoint() },
             ),
             (see.current.given(), i64::from(self.motor.current()) * 10),
@@ -390,6 +400,12 @@ impl Machine {
     }
 }
 
+/// Whether two words for one place have one sign, and neither is 0.
+fn alike(one: Written, other: Written) -> bool {
+    let sign = |of: Written| of.value.cast_signed().signum();
+    (one.space, one.address, sign(one)) == (other.space, other.address, sign(other)) && one.value != 0
+}
+
 /// How many hertz are one count of a register, as a fraction.
 fn hertz(register: &Register) -> Option<[i64; 2]> {
     let [numerator, denominator] = *register.scale.as_ref()?.get_ref();
@@ -413,6 +429,10 @@ impl Places for Machine {
 
     fn most_words(&self) -> u16 {
         self.profile.capabilities().read_words
+    }
+
+    fn most_written(&self) -> u16 {
+        self.profile.capabilities().write_words
     }
 
     fn read_at(&self, place: (Space, u16)) -> Result<u16, Exception> {

@@ -1,7 +1,9 @@
 //! A profile that was checked: [`Profile`].
 
+use drive_core::Direction;
+
 use crate::{
-    format::{Action, Answer, File, Guard, Register, Space, Step},
+    format::{Action, Answer, File, Guard, Register, Sign, Space, Step},
     ladder::{Gap, Level},
 };
 
@@ -94,6 +96,15 @@ impl Profile {
         all.into_iter().any(is_constant).then_some("registers that only this drive reads so")
     }
 
+    /// How it is started in a direction.
+    pub(crate) fn start(&self, direction: Direction) -> Option<&Action> {
+        let start = match direction {
+            Direction::Forward => &self.file.start.forward,
+            Direction::Reverse => &self.file.start.reverse,
+        };
+        start.given().map(crate::format::Spanned::get_ref)
+    }
+
     /// Whether anything that its drive reads to be tells it from others.
     #[must_use]
     pub fn tells_itself(&self) -> bool {
@@ -115,16 +126,22 @@ impl File {
 
     /// What an action writes, in its order, register by register.
     pub(crate) fn writes(&self, action: &Action) -> Vec<Written> {
-        action.steps.iter().flat_map(|step| self.written(step.get_ref())).collect()
+        action.steps.iter().flat_map(|step| self.written(step.get_ref(), None)).collect()
     }
 
-    /// What a step writes.
-    pub(crate) fn written(&self, step: &Step) -> Vec<Written> {
+    /// What a step writes; where that is the setpoint, so many counts of it, or the least where there is none.
+    pub(crate) fn written(&self, step: &Step, setpoint: Option<i32>) -> Vec<Written> {
         let register = step.write.as_ref().and_then(|name| self.named(name.get_ref()));
         let Some((space, first)) = register.and_then(|register| self.place(register)) else {
             return Vec::new();
         };
-        let words = step.words.iter().flatten().copied();
+        let least = || self.setpoint.given().map(|setpoint| setpoint.get_ref().limits.get_ref().low);
+        let signed = step
+            .setpoint
+            .as_ref()
+            .zip(setpoint.or_else(least))
+            .map(|(sign, counts)| sign.get_ref().word(counts));
+        let words = step.words.iter().flatten().copied().chain(signed);
         let coils = step.coils.iter().flatten().map(|&on| u16::from(on));
         let values = words.chain(coils).zip(0_u16..);
         values.map(|(value, at)| Written { space, address: first.saturating_add(at), value }).collect()
@@ -132,8 +149,8 @@ impl File {
 
     /// The word of a start that runs the motor. Of several words in its last step it is the one that [command] says, and of several of
     /// these the one in the register that reads back: by it a drive tells this side's run command from another's.
-    pub(crate) fn run_word(&self, start: &Action) -> Option<u16> {
-        let written = self.written(start.steps.last()?.get_ref());
+    pub(crate) fn run_word(&self, start: &Action, setpoint: Option<i32>) -> Option<u16> {
+        let written = self.written(start.steps.last()?.get_ref(), setpoint);
         let read_back = self.read_back();
         let mut runs = written.iter().filter(|written| self.runs(**written));
         let reads_back = |of: &&Written| Some((of.space, of.address)) == read_back;
@@ -151,6 +168,12 @@ impl File {
     pub(crate) fn commanded(&self) -> impl Iterator<Item = (Space, u16)> {
         let runs = self.command.given().into_iter().flat_map(|command| &command.get_ref().runs);
         runs.filter_map(|run| self.place(self.named(run.get_ref().register.get_ref())?))
+    }
+
+    /// Whether the setpoint is the run command: a start is the setpoint, written.
+    pub(crate) fn starts_by_setpoint(&self) -> bool {
+        let starts = [&self.start.forward, &self.start.reverse].into_iter().filter_map(Answer::given);
+        starts.into_iter().any(|start| start.get_ref().starts_by_setpoint())
     }
 
     /// Every action with its name.
@@ -176,5 +199,22 @@ impl File {
             let place = self.named(run.register.get_ref()).and_then(|register| self.place(register));
             place == Some((written.space, written.address)) && run.fit(written.value)
         })
+    }
+}
+
+impl Action {
+    /// Whether its last step writes the setpoint.
+    pub(crate) fn starts_by_setpoint(&self) -> bool {
+        self.steps.last().is_some_and(|step| step.get_ref().setpoint.is_some())
+    }
+}
+
+impl Sign {
+    /// The word of so many counts with this sign.
+    pub(crate) fn word(self, counts: i32) -> u16 {
+        let counts = if self == Self::Negative { counts.wrapping_neg() } else { counts };
+        // The checker lets no limit pass that its register does not hold.
+        let [_, _, high, low] = counts.to_be_bytes();
+        u16::from_be_bytes([high, low])
     }
 }

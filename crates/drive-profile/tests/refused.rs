@@ -478,3 +478,61 @@ mod others {
         );
     }
 }
+
+const SIGNED: &str = include_str!("data/signed.toml");
+
+#[track_caller]
+fn refused_of_signed(place: &str, by: &str, reason: &str) {
+    assert_eq!(SIGNED.matches(place).count(), 1, "{place}");
+    let refusals = read(&SIGNED.replace(place, by)).map(|profile| profile.level()).expect_err(reason);
+    assert!(refusals.to_string().contains(reason), "{refusals}");
+}
+
+/// Whoever gives a setpoint to it starts it: LinuxCNC and FluidNC write a speed before they write a run command.
+#[test]
+fn a_setpoint_that_runs_the_motor_by_itself() {
+    let text = damaged(
+        GOODRIVE,
+        "runs = [",
+        "runs = [{ register = \"FREQ\", mask = 0xFFFF, value = 0, differs = true, source = \"manuals\" }, ",
+    );
+    let told = read(&text).expect_err("a setpoint starts it").to_string();
+    assert!(told.contains("runs the motor by itself"), "{told}");
+}
+
+#[test]
+fn a_setpoint_that_is_the_command_and_may_be_0_or_has_no_sign_or_is_written_elsewhere() {
+    refused_of_signed("limits = { low = 1,", "limits = { low = 0,", "0 is the stop");
+    refused_of_signed("sign_is_direction = true", "sign_is_direction = false", "whose sign is no direction");
+    refused_of_signed(
+        "words = [0] }], seen",
+        "setpoint = \"positive\" }], seen",
+        "writes a setpoint where none belongs",
+    );
+    refused_of_signed(
+        "{ write = \"SPEED\", setpoint = \"negative\" }",
+        "{ write = \"SPEED\", words = [1] }",
+        "the other start does",
+    );
+    refused_of_signed(
+        "{ write = \"SPEED\", setpoint = \"negative\" }",
+        "{ write = \"RESET\", setpoint = \"negative\" }",
+        "where none belongs",
+    );
+    refused_of_signed("value = 0, differs = true", "value = 1, differs = false", "that it runs nothing");
+}
+
+/// Function 23 reads a holding register along: of a drive whose state stands in none it is not known which.
+#[test]
+fn a_write_by_function_23_of_a_drive_that_has_nothing_to_read_along() {
+    let split =
+        include_str!("data/split.toml").replace("functions = [3, 4, 6, 16]", "functions = [3, 4, 6, 16, 23]");
+    let text = split.replace(
+        "ramp = { steps = [{ write = \"RUN\", words = [0] }]",
+        "ramp = { steps = [{ write = \"RUN\", words = [0], function = 23 }]",
+    );
+    assert!(
+        read(&split).is_ok()
+            && read(&text).expect_err("nothing to read").to_string().contains("by a function")
+    );
+}

@@ -23,7 +23,7 @@ pub struct Args {
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     match profiles::profile(&args.file) {
-        Ok(profile) => args.json.say(|| object(&profile), || tell(&profile)),
+        Ok(profile) => args.json.say(|| object(&profile), || tell(args, &profile)),
         Err(profiles::ProfilesError::Refused { refusals, .. }) => {
             args.json.say(|| refused(&refusals), || tell_refusals(args, &refusals))?;
             let number = output::counted(refusals.0.len(), "place is", "places are");
@@ -33,7 +33,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
-fn tell(profile: &Profile) -> Result<(), Failure> {
+fn tell(args: &Args, profile: &Profile) -> Result<(), Failure> {
     output::say(format_args!("{}: it reaches {}", profile.name(), profile.level()))?;
     let (keeps, said): (Vec<_>, Vec<_>) = profile.gaps().iter().partition(|gap| gap.keeps_from.is_some());
     if let Some(next) = keeps.first() {
@@ -43,8 +43,15 @@ fn tell(profile: &Profile) -> Result<(), Failure> {
         output::say(format_args!("  line {}: {}: {}", gap.line, gap.what, gap.question))?;
     }
     if profile.level() == Level::Motion {
-        output::say("nothing keeps it from motion; drived profile try climbs with the real drive")?;
+        output::say("nothing keeps it from motion")?;
     }
+    let (file, folder) = (args.file.display(), args.file.parent().filter(|of| !of.as_os_str().is_empty()));
+    let folder = folder.map_or_else(|| ".".to_owned(), |folder| folder.display().to_string());
+    output::say(format_args!("try it on its simulated twin: drived profile try {file} --sim"))?;
+    output::say(format_args!(
+        "use it by its key, {}: DRIVED_PROFILES={folder} drived …, or profiles = \"{folder}\" in a configuration",
+        profile.key()
+    ))?;
     if !said.is_empty() {
         output::say("not known, and told to whoever it matters to:")?;
     }

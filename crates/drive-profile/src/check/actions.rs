@@ -4,12 +4,15 @@ use crate::format::Spanned;
 
 use super::Check;
 use crate::{
-    format::{Access, Action, File, Register, Step, Storage},
+    format::{Access, Action, File, Register, Sign, Space, Step, Storage},
     profile::Written,
 };
 
 /// The most steps of an action.
 const STEPS: usize = 16;
+
+/// The function that writes registers and reads others in one exchange.
+const READ_WRITE: u8 = 23;
 
 /// The longest pause or wait, in ms.
 const LONGEST_WAIT: u16 = 10_000;
@@ -41,6 +44,7 @@ impl Check<'_> {
             self.reset(reset);
         }
         self.setup();
+        self.by_setpoint();
         let unread = &file.stop.unread;
         let has_stops = file.actions().any(|(name, _)| name.starts_with("stop."));
         if has_stops && file.stop.of(*unread.get_ref()).given().is_none() {
@@ -64,15 +68,15 @@ impl Check<'_> {
         for spanned in steps {
             let step = spanned.get_ref();
             let kinds = [step.write.is_some(), step.pause_ms.is_some(), step.awaits.is_some()];
-            let belongs = step.words.is_some() as u8 + step.coils.is_some() as u8
-                == u8::from(step.write.is_some())
+            let written = [step.words.is_some(), step.coils.is_some(), step.setpoint.is_some()];
+            let belongs = written.into_iter().filter(|is| *is).count() == usize::from(step.write.is_some())
                 && step.within_ms.is_some() == step.awaits.is_some()
                 && (step.function.is_none() || step.write.is_some());
             if kinds.into_iter().filter(|kind| *kind).count() != 1 || !belongs {
                 self.refuse(
                     &spanned.span(),
                     "a step is one thing",
-                    "{ write, words or coils }, { pause_ms } or { await, within_ms }",
+                    "{ write, words or coils }, { write, setpoint }, { pause_ms } or { await, within_ms }",
                 );
             }
             for time in [&step.pause_ms, &step.within_ms].into_iter().flatten() {
@@ -92,7 +96,9 @@ impl Check<'_> {
         let Some(to) = &step.write else { return };
         let Some(register) = self.register(to) else { return };
         let Some((space, _)) = self.file.place(register) else { return };
-        let count = step.words.as_ref().map_or(0, Vec::len) + step.coils.as_ref().map_or(0, Vec::len);
+        let count = step.words.as_ref().map_or(0, Vec::len)
+            + step.coils.as_ref().map_or(0, Vec::len)
+            + usize::from(step.setpoint.is_some());
         let link = self.file.link.get_ref();
         let most = if space.is_bit() { &link.write_coils } else { &link.write_words };
         let most = usize::from(most.given().copied().unwrap_or(1));
@@ -106,7 +112,11 @@ impl Check<'_> {
         let by = space.written_by();
         let usual = by.map(|[one, several]| if count == 1 && self.has(one) { one } else { several });
         let function = step.function.as_ref().map(|function| *function.get_ref()).or(usual);
-        let fits = |function| by.is_some_and(|by| by.contains(&function)) && self.has(function);
+        // Function 23 reads a register along, which it has to know.
+        let both =
+            |function| function == READ_WRITE && space == Space::HoldingRegister && self.tells_its_state();
+        let can = |function| by.is_some_and(|by| by.contains(&function)) || both(function);
+        let fits = |function| can(function) && self.has(function);
         if !function.is_some_and(fits) || function == by.map(|[one, _]| one) && count != 1 {
             self.refuse(
                 &spanned.span(),
@@ -149,7 +159,7 @@ impl Check<'_> {
     /// What a step writes behind its first register can be written as that one can.
     fn passed_over(&mut self, name: &str, spanned: &Spanned<Step>) {
         let file = self.file;
-        for written in file.written(spanned.get_ref()).into_iter().skip(1) {
+        for written in file.written(spanned.get_ref(), None).into_iter().skip(1) {
             let at =
                 |of: &&Spanned<Register>| file.place(of.get_ref()) == Some((written.space, written.address));
             for register in file.register.values().filter(at).map(Spanned::get_ref) {
@@ -181,6 +191,16 @@ impl Check<'_> {
                 "a register that is the whole word, without `byte` and `words`",
             );
         }
+    }
+
+    /// Whether a holding register tells the state.
+    fn tells_its_state(&self) -> bool {
+        let file = self.file;
+        let named =
+            file.state.is.iter().filter_map(|is| file.named(is.get_ref().bits.get_ref().register.get_ref()));
+        named
+            .into_iter()
+            .any(|register| file.place(register).is_some_and(|(space, _)| space == Space::HoldingRegister))
     }
 
     fn has(&self, function: u8) -> bool {
@@ -246,7 +266,7 @@ impl Check<'_> {
     fn start(&mut self, name: &str, action: &Spanned<Action>) {
         let file = self.file;
         let steps = &action.get_ref().steps;
-        let runs = |step: &Step| file.written(step).into_iter().any(|written| file.runs(written));
+        let runs = |step: &Step| file.written(step, None).into_iter().any(|written| file.runs(written));
         let (last, before) = match steps.split_last() {
             Some((last, before)) => (runs(last.get_ref()), before.iter().any(|step| runs(step.get_ref()))),
             None => return,
@@ -267,14 +287,84 @@ impl Check<'_> {
         }
     }
 
-    /// An edge is cleared: by the drive, or by a word that stops.
+    /// A setpoint goes out in the last step of each start, or in none: what was given is written to the setpoint's register, never 0.
+    fn by_setpoint(&mut self) {
+        let file = self.file;
+        let by_setpoint = file.starts_by_setpoint();
+        let register = file.setpoint.given().map(|setpoint| setpoint.get_ref().register.get_ref());
+        for (name, action) in file.actions() {
+            let steps = &action.get_ref().steps;
+            for (at, spanned) in steps.iter().enumerate() {
+                let step = spanned.get_ref();
+                let Some(sign) = &step.setpoint else { continue };
+                let is_last = name.starts_with("start.") && at + 1 == steps.len();
+                if !is_last || step.write.as_ref().map(Spanned::get_ref) != register {
+                    self.refuse(
+                        &sign.span(),
+                        format!("{name} writes a setpoint where none belongs"),
+                        "the register of [setpoint], in the last step of a start",
+                    );
+                }
+                let fact = file.setpoint.given().map(Spanned::get_ref);
+                if *sign.get_ref() == Sign::Negative && fact.is_none_or(|fact| !fact.sign_is_direction) {
+                    self.refuse(
+                        &sign.span(),
+                        "a negative setpoint of a drive whose sign is no direction",
+                        "sign_is_direction = true, or setpoint = \"positive\"",
+                    );
+                }
+            }
+            if by_setpoint && name.starts_with("start.") && !action.get_ref().starts_by_setpoint() {
+                self.refuse(
+                    &action.span(),
+                    format!("{name} writes no setpoint, and the other start does"),
+                    "setpoint = \"positive\" or \"negative\" in the last step of both",
+                );
+            }
+        }
+        let Some(setpoint) = file.setpoint.given().map(Spanned::get_ref) else { return };
+        let Some((space, address)) = file.named(setpoint.register.get_ref()).and_then(|of| file.place(of))
+        else {
+            return;
+        };
+        let limits = &setpoint.limits;
+        if by_setpoint && limits.get_ref().low < 1 {
+            self.refuse(
+                &limits.span(),
+                "a setpoint that is the run command, and 0 among its limits: 0 is the stop",
+                "low = the least that turns it, at least 1",
+            );
+        }
+        let counts = [limits.get_ref().low, limits.get_ref().high];
+        let signs = if setpoint.sign_is_direction {
+            &[Sign::Positive, Sign::Negative][..]
+        } else {
+            &[Sign::Positive][..]
+        };
+        let words = signs.iter().flat_map(|sign| counts.map(|counts| sign.word(counts)));
+        let runs: Vec<bool> = words.map(|value| file.runs(Written { space, address, value })).collect();
+        if by_setpoint && runs.contains(&false) {
+            self.refuse(
+                &limits.span(),
+                "a setpoint that is the run command, of which [command] says that it runs nothing",
+                "runs = [{ register = the setpoint's, mask = 0xFFFF, value = 0, differs = true, ... }]",
+            );
+        } else if !by_setpoint && runs.contains(&true) {
+            self.refuse(
+                &setpoint.register.span(),
+                format!("{} runs the motor by itself: whoever gives a setpoint would start it", setpoint.register.get_ref()),
+                "starts whose last step is { write = the setpoint's register, setpoint = \"positive\" }, or another register",
+            );
+        }
+    }
+
     /// What makes guards true is a setting. A command among them stops or starts a motor that somebody else drives.
     fn setup(&mut self) {
         let Some(setup) = self.file.setup.given() else { return };
         let file = self.file;
         // By its place, and not by its name: a block has no name for what lies behind its first register.
         let is_command = |step: &Step| {
-            let places = file.written(step).into_iter().map(|written| (written.space, written.address));
+            let places = file.written(step, None).into_iter().map(|written| (written.space, written.address));
             places.into_iter().any(|place| file.commanded().any(|command| command == place))
         };
         let steps = setup.get_ref().steps.iter().map(Spanned::get_ref);
@@ -288,10 +378,11 @@ impl Check<'_> {
         }
     }
 
+    /// An edge is cleared: by the drive, or by a word that stops.
     fn reset(&mut self, reset: &Spanned<Action>) {
         let file = self.file;
         let action = reset.get_ref();
-        let last = action.steps.iter().rev().find_map(|step| file.written(step.get_ref()).pop());
+        let last = action.steps.iter().rev().find_map(|step| file.written(step.get_ref(), None).pop());
         let stops = |written: Written| {
             let stops = file.actions().filter(|(name, _)| name.starts_with("stop."));
             stops.flat_map(|(_, stop)| file.writes(stop.get_ref())).any(|stop| stop == written)

@@ -45,23 +45,86 @@ fn too_deep(text: &str) -> Option<usize> {
         .next()
 }
 
+/// What is to be written under a key that has no answer "none" or "unknown".
+const KEYS: &[(&str, &str)] = &[
+    (
+        "access",
+        "access = \"read\", \"read_write\", \"write_stopped\" (only while the motor stands) or \"write\" (nobody reads it)",
+    ),
+    (
+        "acts",
+        "acts = \"level\" where a run command that stands starts the motor when the power comes back, \"edge\" where it has to be written anew, or \"unknown\"",
+    ),
+    ("address", "address = the number as the manual prints it"),
+    ("bits", "bits = { register = \"...\", mask = 0x0001, value = 0x0001, source = \"...\" }"),
+    ("do", "do = \"write\" with register and word, \"wait\" or \"run\""),
+    ("document", "document = the manual's title and number, or the repository"),
+    ("functions", "functions = those of 1 to 6, 15, 16 and 23 that the drive answers, such as [3, 6]"),
+    (
+        "limits",
+        "limits = { low = 0, high = ... } in counts, with high_in = a register or \"owner\" where the drive allows less",
+    ),
+    ("list", "list = [[code, mnemonic, meaning, remedy], ...]"),
+    (
+        "mark",
+        "mark = \"P\" (the maker's manual), \"R\" (a public repository), \"D\" (arithmetic from these), or \"X\", \"M\", \"W\", which move no motor",
+    ),
+    ("mask", "mask = the bits that count, such as 0x0008"),
+    ("numbering", "numbering = \"wire\" (from 0), \"from_one\" or \"from_40001\", as the manual counts"),
+    ("page", "page = the pages, sections or files"),
+    (
+        "proves",
+        "proves = \"bus\" where the bits say that the bus commands it, \"nothing\" where they say only that it may",
+    ),
+    ("register", "register = the name of a table [register.NAME]"),
+    (
+        "runs",
+        "runs = every form of a word that runs the motor: [{ register = \"...\", mask = 0x0001, value = 0x0001, source = \"...\" }]",
+    ),
+    (
+        "sign_is_direction",
+        "sign_is_direction = true where a negative setpoint turns it the other way, else false",
+    ),
+    ("source", "source = one name of [sources], or several with spaces between"),
+    ("space", "space = \"holding_register\", \"input_register\", \"coil\" or \"discrete_input\""),
+    (
+        "state",
+        "state = \"fault\", \"fault_reaction\", \"running\", \"stopping\", \"quick_stop\", \"ready\", \"disabled\" or \"not_ready\"",
+    ),
+    ("steps", "steps = [{ write = \"...\", words = [...] }]"),
+    (
+        "unread",
+        "unread = \"ramp\", \"fast\", \"freewheel\" or \"dc_injection\": the one that is a stop whatever the guards say",
+    ),
+    ("value", "value = how the bits of the mask are then"),
+    ("what", "what = what it is, in a few words"),
+    ("why", "why = why it is never written"),
+];
+
 /// What the parser says, in the words of whoever writes a profile.
 fn refusal(text: &str, error: &toml::de::Error) -> Refusal {
     let message = error.message();
     let line = line(text, &error.span().unwrap_or(0..0));
     let quoted = |begin: &str| message.strip_prefix(begin)?.split('`').nth(1);
+    let expected =
+        message.split_once("expected ").map(|(_, expected)| expected.lines().collect::<Vec<_>>().join(" "));
     let (reason, write) = if let Some(question) = quoted("missing field ") {
-        (
-            format!("the question `{question}` is left in silence"),
+        let known = KEYS.iter().find(|(key, _)| *key == question).map(|(_, write)| (*write).to_owned());
+        let usual = || {
             format!(
                 "{question} = what the manual says, \"none\" where there is none, \"unknown\" where nobody knows"
-            ),
-        )
+            )
+        };
+        (format!("the question `{question}` is left in silence"), known.unwrap_or_else(usual))
     } else if let Some(key) = quoted("unknown field ") {
-        let instead = message.split_once("expected ").map_or("a key of the format", |(_, instead)| instead);
+        let instead = expected.as_deref().unwrap_or("a key of the format");
         (format!("`{key}` is no key of the format"), format!("{instead}, or nothing"))
+    } else if let Some(word) = quoted("unknown variant ") {
+        let instead = expected.unwrap_or_else(|| "one of the words of the format".to_owned());
+        (format!("`{word}` is none of the words that may stand there"), instead)
     } else {
-        (message.lines().collect::<Vec<_>>().join(" "), "what the format has in this place".to_owned())
+        let instead = expected.unwrap_or_else(|| "what the format has in this place".to_owned());
+        (message.lines().collect::<Vec<_>>().join(" "), instead)
     };
     Refusal { line, reason, write }
 }

@@ -11,7 +11,7 @@ use tokio::time::{Duration, Instant, sleep};
 
 use super::{
     ProfileDrive,
-    reading::{OTHER_REFERENCE, OTHERS, withheld},
+    reading::{OTHERS, lacks},
     tables::{mode_name, stop_mode},
 };
 use crate::{
@@ -29,9 +29,16 @@ const NOT_ALONE: Refusal = Refusal::Settings(
      it, and say so by commands-alone = yes",
 );
 
+const NO_SETPOINT: Refusal = Refusal::Settings(
+    "its setpoint is its run command, and none was given since it was reached: give it one, then start it",
+);
+
 /// How far an output has to fall to be on its way down: more than the few counts by which that of many drives flickers. A ramp that
 /// falls less in the time that a command has to show (200 s from 50 Hz) is seen by its end, and not by its beginning.
 const FALL: Frequency = Frequency::from_centihertz(50);
+
+/// The function that writes registers and reads others in one exchange.
+const READ_WRITE: u8 = 23;
 
 /// The most rungs of a ladder that are climbed for one start.
 const RUNGS: usize = 8;
@@ -41,31 +48,36 @@ impl<P: Port> ProfileDrive<P> {
         let order = Order::Start(direction);
         self.allow(Level::Motion, "a start")?;
         let profile = self.profile.clone();
-        let start = &profile.file().start;
-        let action = match direction {
-            Direction::Forward => &start.forward,
-            Direction::Reverse => &start.reverse,
-        };
-        let Some(action) = action.given().map(crate::format::Spanned::get_ref) else {
+        let Some(action) = profile.start(direction) else {
             return Err(Error::Unsupported {
                 what: "a start in this direction",
                 reason: "its profile does not say how",
             });
         };
-        let (status, _) = self.read_status(Class::Command).await?;
+        let (status, words) = self.read_status(Class::Command).await?;
         self.guard(order).await?;
-        let local = (status.control == Some(Control::Local)).then_some(OTHERS);
+        let local = self.commanded_by_other(&words);
         let runs = matches!(status.state, State::Running | State::Stopping) && self.comes_down.is_none();
         let others = (runs && self.watch.run.lease().is_none()).then_some(NOT_OURS);
         if let Some(reason) = status.bars_motion().or(local).or(others) {
             return Err(self.refused(order, reason));
         }
+        if action.starts_by_setpoint() && self.kept.is_none() {
+            return Err(self.refused(order, NO_SETPOINT));
+        }
+        if self.agreed.is_none() {
+            self.agreed = self.setpoint_held().await;
+        }
         self.climb(order).await?;
         let Some((last, before)) = action.steps.split_last() else { return Err(self.refused(order, OTHERS)) };
+        let mut is_begun = false;
         for step in before {
-            self.step(step.get_ref(), Class::Command, order).await?;
+            let done = self.step(step.get_ref(), Class::Command, order).await;
+            // What was written before it may have turned round a motor that runs.
+            done.map_err(|error| if is_begun { error.after_write() } else { error })?;
+            is_begun |= step.get_ref().write.is_some();
         }
-        let word = profile.file().run_word(action).unwrap_or(0);
+        let word = profile.file().run_word(action, self.kept).unwrap_or(0);
         self.watch.run.give(Lease::new(direction, word));
         self.comes_down = None;
         let sent = self.step(last.get_ref(), Class::Command, order).await;
@@ -74,11 +86,12 @@ impl<P: Port> ProfileDrive<P> {
             Ok(()) => self.watch.run.was_written(),
             Err(error) if error.kind() == ErrorKind::NotSent => {
                 self.watch.run.was_not_written();
-                return Err(error);
+                return Err(if is_begun { error.after_write() } else { error });
             }
             // An exception is no proof that nothing was done.
             Err(error) => return Err(error.after_write()),
         }
+        self.fed = Some(Instant::now());
         self.see_start(direction).await.map_err(Error::after_write)
     }
 
@@ -99,10 +112,10 @@ impl<P: Port> ProfileDrive<P> {
                 (Deed::Run, ..) => return Ok(()),
                 (Deed::Write, Some(register), Some(word)) if written < RUNGS => {
                     written += 1;
-                    if let Some((_, address)) =
+                    if let Some((space, address)) =
                         profile.file().named(register.get_ref()).and_then(|of| profile.file().place(of))
                     {
-                        self.watch.run.sends(word);
+                        self.sends(&[Written { space, address, value: word }]);
                         self.registers.at(Class::Command).write_word(address, word).await?;
                     }
                 }
@@ -126,12 +139,8 @@ impl<P: Port> ProfileDrive<P> {
                 Err(error) if error.kind() == ErrorKind::NoAnswer && confirming.again().await => continue,
                 Err(error) => return Err(error),
             };
-            let local = (status.control == Some(Control::Local)).then_some(OTHERS);
-            // What was given and what the drive shows may be two things: an input adds to it, or a preset takes its place.
-            let seen = self.setpoint_seen(&words);
-            let other =
-                (self.agreed.is_some() && seen.is_some() && self.agreed != seen).then_some(OTHER_REFERENCE);
-            let because = local.or_else(|| withheld(&status)).or(other);
+            // By the evidence of a verdict: whatever keeps a run command from being in force keeps a start from being confirmed.
+            let because = lacks(&self.evidence(&status, &words));
             let output = status.output_frequency;
             let slows = output.is_some_and(|output| has_fallen(output, first));
             if because.is_none() && (status.direction == Some(direction) || !tells_direction || slows) {
@@ -180,8 +189,15 @@ impl<P: Port> ProfileDrive<P> {
                 .iter()
                 .flat_map(crate::format::Spanned::get_ref)
                 .any(|state| state.state() == status.state);
-            let falls = comes_down(&status, first);
-            if written.is_ok() && (seen || falls) {
+            let held = self.watch.run.held().map(|held| self.is_run(held));
+            // A run word of this side that was late may stand in place of the stop by now.
+            let stands = held == Some(true);
+            // Where no run word stands any more, an output that goes down does so by that.
+            let falls = match (held, status.output_frequency) {
+                (Some(false), Some(output)) => status.state == State::Running && has_fallen(output, first),
+                _ => comes_down(&status, first),
+            };
+            if written.is_ok() && !stands && (seen || falls) {
                 if falls && status.state == State::Running {
                     status.state = State::Stopping;
                     self.comes_down = status.output_frequency.map(Frequency::centihertz);
@@ -249,8 +265,11 @@ impl<P: Port> ProfileDrive<P> {
         let mut first = None;
         loop {
             let (status, _) = self.read_status(Class::Command).await.map_err(Error::after_write)?;
-            if status.state != State::Running && status.state != State::Unknown || comes_down(&status, first)
-            {
+            // Where the command reads back, that it holds no run word is seen whoever runs the motor.
+            let held = self.watch.run.held();
+            let is_gone = held.map(|held| !self.is_run(held));
+            let stands = !matches!(status.state, State::Running | State::Unknown);
+            if is_gone.unwrap_or_else(|| stands || comes_down(&status, first)) {
                 self.watch.run.end();
                 return Ok(Withdrawn::Ended(Status { verdict: None, ..status }));
             }
@@ -310,7 +329,7 @@ impl<P: Port> ProfileDrive<P> {
     }
 
     /// One step of an action.
-    async fn step(&mut self, step: &Step, class: Class, order: Order) -> Result<()> {
+    pub(super) async fn step(&mut self, step: &Step, class: Class, order: Order) -> Result<()> {
         if let Some(pause) = &step.pause_ms {
             sleep(Duration::from_millis((*pause.get_ref()).into())).await;
         }
@@ -329,25 +348,39 @@ impl<P: Port> ProfileDrive<P> {
                 }
             }
         }
-        let writes = self.profile.file().written(step);
+        let writes = self.profile.file().written(step, self.kept);
         self.write(step, &writes, class, order).await
+    }
+
+    /// What is about to be written. A command word is what reads back as one: a word for another register says nothing of it.
+    fn sends(&mut self, writes: &[Written]) {
+        let read_back = self.profile.file().read_back();
+        let command = writes.iter().find(|written| Some((written.space, written.address)) == read_back);
+        if let Some(command) = command {
+            self.watch.run.sends(command.value);
+        }
     }
 
     async fn write(&mut self, step: &Step, writes: &[Written], class: Class, order: Order) -> Result<()> {
         let Some(&Written { space, address, value }) = writes.first() else { return Ok(()) };
-        // Of several words the one that reads back is held against what is read.
-        let read_back = self.profile.file().read_back();
-        let reads_back = |written: &&Written| Some((written.space, written.address)) == read_back;
-        self.watch.run.sends(writes.iter().find(reads_back).map_or(value, |written| written.value));
+        self.sends(writes);
         let is_edge = order == Order::ResetFaults;
         let mut calls = self.registers.at(class);
         if is_edge {
             calls = calls.edge();
         }
-        let several =
-            writes.len() > 1 || step.function.as_ref().is_some_and(|function| *function.get_ref() >= 15);
+        let by = step.function.as_ref().map(|function| *function.get_ref());
+        let several = writes.len() > 1 || by.is_some_and(|function| function >= 15);
         if !space.is_bit() {
             let words: Vec<u16> = writes.iter().map(|written| written.value).collect();
+            if let Some((function @ READ_WRITE, along)) = by.zip(self.profile.read_along()) {
+                let exchange = Exchange { function, register: Some(address) };
+                let request = Request::ReadWriteMultipleRegisters(along, 1, address, Cow::Borrowed(&words));
+                return match calls.request(request, exchange).await? {
+                    Response::ReadWriteMultipleRegisters(read) if read.len() == 1 => Ok(()),
+                    _ => Err(calls.answer(exchange, "the answer holds another number of registers")),
+                };
+            }
             return if several {
                 calls.write_words(address, &words).await
             } else {

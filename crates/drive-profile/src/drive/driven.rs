@@ -2,9 +2,10 @@
 
 use drive_core::{
     Class, Command, Direction, Drive, Error, Faults, Identity, Lease, Measurements, Port, Recognised,
-    Refusal, Result, Row, Setpoint, Status, StopMode, Stopped, Withdrawn, Written, async_trait,
-    registers::refuse_commands,
+    Refusal, Result, Row, Setpoint, Status, StopMode, Stopped, WatchdogCapability, Withdrawn, Written,
+    async_trait, registers::refuse_commands,
 };
+use tokio::time::Instant;
 
 use super::ProfileDrive;
 
@@ -14,12 +15,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
     drive_core::watched_by!(watch);
 
     fn run_word_for(&self, direction: Direction) -> Option<u16> {
-        let file = self.profile.file();
-        let start = match direction {
-            Direction::Forward => &file.start.forward,
-            Direction::Reverse => &file.start.reverse,
-        };
-        file.run_word(start.given()?.get_ref())
+        self.profile.file().run_word(self.profile.start(direction)?, self.kept)
     }
 
     fn adopt(&mut self, lease: Lease) {
@@ -30,7 +26,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
     fn forget(&mut self) {
         self.watch.lose_sight();
         self.guarded.forget(&self.profile);
-        self.comes_down = None;
+        (self.comes_down, self.kept, self.fed, self.output_seen) = (None, None, None, None);
     }
 
     fn recognise(&self, _: &drive_core::Identity) -> Recognised {
@@ -58,8 +54,11 @@ impl<P: Port> Drive for ProfileDrive<P> {
             // Whoever cannot be asked is read all the same; nothing is written before the guards are seen.
             self.see_guards(Class::Status).await.ok();
         }
+        let began = Instant::now();
         let (mut status, words) = self.read_status(Class::Status).await?;
         self.judge(&mut status, &words);
+        // A drive that was not fed stops by its own watchdog, and the next status shows it.
+        self.feed(&status, began).await.ok();
         Ok(status)
     }
 
@@ -95,8 +94,26 @@ impl<P: Port> Drive for ProfileDrive<P> {
         self.pulse_reset().await
     }
 
-    /// A reading: a watchdog that only a write feeds is not fed by it. Nothing here repeats a run word.
+    /// A watchdog that its owner has told of and that the bus cannot set: it has to be fed.
+    fn watchdog_capability(&self) -> Option<WatchdogCapability> {
+        let fixed = |time| WatchdogCapability {
+            min: time,
+            max: time,
+            step: time,
+            reactions: &[],
+            settable: false,
+            wears: false,
+        };
+        self.owner.watchdog.map(fixed)
+    }
+
+    /// A reading; where a command word feeds the watchdog, behind a look at the drive, the word that stands.
     async fn keep_alive(&mut self) -> Result<()> {
+        if self.owner.watchdog.is_some() {
+            let began = Instant::now();
+            let (status, _) = self.read_status(Class::KeepAlive).await?;
+            return self.feed(&status, began).await;
+        }
         let Some(block) = self.fast.first().copied() else { return Ok(()) };
         self.read_block(Class::KeepAlive, block).await.map(drop)
     }

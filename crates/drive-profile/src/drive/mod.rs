@@ -2,6 +2,7 @@
 
 mod command;
 mod driven;
+mod feed;
 mod guards;
 mod owner;
 mod plan;
@@ -11,7 +12,10 @@ mod tables;
 
 use std::sync::Arc;
 
-use drive_core::{Error, ExceptionMeaning, Port, Refusal, Registers, SlaveAddress, Status, Watch, interned};
+use drive_core::{
+    Error, ExceptionMeaning, Frequency, Port, Refusal, Registers, SlaveAddress, Status, Watch, interned,
+};
+use tokio::time::Instant;
 
 pub use owner::Owner;
 
@@ -32,6 +36,12 @@ pub struct ProfileDrive<P> {
     guarded: Guarded,
     /// The setpoint that a run command of this side rests on, as the drive shows it.
     agreed: Option<i64>,
+    /// The setpoint that the next start gives, in counts: of a drive whose setpoint is its run command.
+    kept: Option<i32>,
+    /// When a command word of this side was last written.
+    fed: Option<Instant>,
+    /// The output at the last look behind which it could have been.
+    output_seen: Option<Frequency>,
     /// A stop of this side was seen, and the motor may still come down by it: its output then.
     comes_down: Option<u32>,
 }
@@ -43,8 +53,21 @@ impl<P: Port> ProfileDrive<P> {
         let registers = Registers::new(port, slave, profile.capabilities(), meaning);
         let (fast, slow) = (profile.fast(), profile.slow());
         let guarded = Guarded::of(&profile);
-        let (watch, agreed, comes_down) = (Watch::default(), None, None);
-        Self { registers, profile, fast, slow, owner, watch, guarded, agreed, comes_down }
+        let watch = Watch::default();
+        Self {
+            registers,
+            profile,
+            fast,
+            slow,
+            owner,
+            watch,
+            guarded,
+            agreed: None,
+            kept: None,
+            fed: None,
+            output_seen: None,
+            comes_down: None,
+        }
     }
 
     /// What the profile does not let be done.

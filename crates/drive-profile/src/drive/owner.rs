@@ -1,5 +1,7 @@
 //! What only its owner knows of a drive: [`Owner`].
 
+use std::time::Duration;
+
 use drive_core::Frequency;
 
 /// What only its owner knows of a drive.
@@ -13,6 +15,8 @@ pub struct Owner {
     /// That nothing but this bus commands it, neither terminals nor panel: taken for true where the drive does not tell, for a
     /// reset alone. No run command is told in force by it.
     pub commands_alone: bool,
+    /// The time of its communication watchdog as it is set at the drive: so that it is fed, where a command word alone feeds it too.
+    pub watchdog: Option<Duration>,
 }
 
 impl Owner {
@@ -26,6 +30,12 @@ impl Owner {
     #[must_use]
     pub const fn with_highest(self, highest: Frequency) -> Self {
         Self { highest: Some(highest), ..self }
+    }
+
+    /// The time of its communication watchdog.
+    #[must_use]
+    pub const fn with_watchdog(self, time: Duration) -> Self {
+        Self { watchdog: Some(time), ..self }
     }
 
     /// That nothing but this bus commands it.

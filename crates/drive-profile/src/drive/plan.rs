@@ -116,6 +116,13 @@ impl Profile {
         self.blocks(&names)
     }
 
+    /// The register that a write by function 23 reads along: the first that tells the state.
+    pub(crate) fn read_along(&self) -> Option<u16> {
+        let names = self.file.state.is.iter().map(|is| name(&is.get_ref().bits.get_ref().register));
+        let mut places = names.filter_map(|name| self.place_of(name));
+        places.find(|(_, space, _)| *space == Space::HoldingRegister).map(|(.., address)| address)
+    }
+
     /// What only the measurements read; where there is nothing, what a status does.
     pub(crate) fn slow(&self) -> Vec<Block> {
         let see = &self.file.see;

@@ -8,17 +8,21 @@ use drive_core::{
 use tokio::time::Instant;
 
 use super::{ProfileDrive, Words, hundredths, plan::Block};
-use crate::format::{Owner as OwnerBits, Proves, Space, UnitName};
+use crate::format::{Answer, Owner as OwnerBits, Proves, Space, UnitName};
 
 pub(super) const OTHERS: Refusal = Refusal::Overridden {
     by: "something else than the bus",
     remedy: "give command and reference to the bus at the drive",
 };
-pub(super) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
+const OTHER_REFERENCE: Refusal = Refusal::Overridden {
     by: "another setpoint than was given",
     remedy: "see who else writes to this drive, and that its reference is that of the bus",
 };
-pub(super) const HELD_BACK: Refusal = Refusal::Overridden {
+const OTHER_WORD: Refusal = Refusal::Overridden {
+    by: "another command word than was written",
+    remedy: "see who else writes to this drive",
+};
+const HELD_BACK: Refusal = Refusal::Overridden {
     by: "a stop at the drive, or an input that holds it",
     remedy: "stop it, see what holds it, and start it again if it is to run",
 };
@@ -270,7 +274,7 @@ impl<P: Port> ProfileDrive<P> {
         let reference = match self.owned(words, owner.reference.given().map(crate::format::Spanned::get_ref))
         {
             _ if other => Told::No(OTHER_REFERENCE),
-            Told::Yes if self.agreed.is_none() => Told::NotTold,
+            Told::Yes if self.agreed.is_none() || !self.turns_as_commanded(status) => Told::NotTold,
             told => told,
         };
         let word = match self.watch.run.held() {
@@ -280,8 +284,27 @@ impl<P: Port> ProfileDrive<P> {
         Evidence { word, command, output: Told::unless(withheld(status)), reference }
     }
 
+    /// Who has command or reference instead of the bus, where the drive tells it.
+    pub(super) fn commanded_by_other(&self, words: &Words) -> Option<Refusal> {
+        let owner = &self.profile.file().ownership;
+        let told = [&owner.command, &owner.reference]
+            .map(|owner| self.owned(words, owner.given().map(crate::format::Spanned::get_ref)));
+        told.into_iter().find_map(|told| if let Told::No(because) = told { Some(because) } else { None })
+    }
+
+    /// Whether the motor is seen to turn in the direction of the run command. Of a drive that cannot be turned round nobody has to ask.
+    fn turns_as_commanded(&self, status: &Status) -> bool {
+        let file = self.profile.file();
+        let commanded = self.watch.run.lease().map(|lease| lease.direction);
+        match file.see.direction {
+            Answer::Given(_) => status.direction == commanded,
+            Answer::None => matches!(file.start.reverse, Answer::None),
+            Answer::Unknown => false,
+        }
+    }
+
     /// Whether a word of the command register that reads back runs the motor.
-    fn is_run(&self, word: u16) -> bool {
+    pub(super) fn is_run(&self, word: u16) -> bool {
         let file = self.profile.file();
         let register =
             file.ownership.reads_back.given().and_then(|read| file.named(read.get_ref().register.get_ref()));
@@ -327,8 +350,19 @@ fn see_code(profile: &crate::profile::Profile, words: &Words) -> Option<u16> {
     profile.word(words, profile.file().faults.present.given()?.get_ref())
 }
 
+/// What keeps a run command from being in force, by what the drive shows of it.
+pub(super) fn lacks(evidence: &Evidence) -> Option<Refusal> {
+    let told = |told| if let Told::No(because) = told { Some(because) } else { None };
+    let another = matches!(evidence.word, RunWord::Gone | RunWord::Another).then_some(OTHER_WORD);
+    let is_tripped = matches!(evidence.output, Told::No(Refusal::Tripped | Refusal::Fault(_)));
+    told(evidence.command)
+        .or(another.filter(|_| !is_tripped))
+        .or_else(|| told(evidence.output))
+        .or_else(|| told(evidence.reference))
+}
+
 /// What keeps the motor from being driven by a run command that stands.
-pub(super) fn withheld(status: &Status) -> Option<Refusal> {
+fn withheld(status: &Status) -> Option<Refusal> {
     match status.state {
         State::Running => None,
         State::Fault | State::FaultReaction => {

@@ -1,15 +1,23 @@
 //! The setpoint.
 
 use drive_core::{
-    Class, Command as Order, Confirming, Control, Error, ErrorKind, Frequency, Port, Refusal, Result,
-    Setpoint, SetpointProblem, Speed,
+    Class, Command as Order, Confirming, Control, Error, ErrorKind, Frequency, Lease, Port, Refusal, Result,
+    Setpoint, SetpointProblem, Speed, State, Status, Verdict,
 };
 
 use super::{ProfileDrive, Words, counts, reading::OTHERS};
 use crate::{
-    format::{Register, Setpoint as Fact, UnitName},
+    format::{Access, Register, Setpoint as Fact, Sign, UnitName},
     ladder::Level,
 };
+
+const KEPT: Refusal = Refusal::Overridden {
+    by: "nothing yet: its setpoint is its run command, so that nothing was written; the next start",
+    remedy: "start it",
+};
+const HELD_BACK: Refusal = Refusal::Settings(
+    "its setpoint is its run command, and the motor does not run by the one that was given: stop it, then start it",
+);
 
 const NO_FULL_SCALE: Refusal = Refusal::Settings(
     "the drive counts in percent of a frequency that it does not tell: say it by full-scale, or give a setpoint in percent",
@@ -39,16 +47,13 @@ impl<P: Port> ProfileDrive<P> {
             return Err(self.refused(order, OTHERS));
         }
         let held = self.limits(fact).await?;
-        let word = self.setpoint_word(fact, register, setpoint, &held)?;
+        let counts = self.setpoint_counts(fact, register, setpoint, &held)?;
+        if profile.file().starts_by_setpoint() {
+            return self.give_run_command(setpoint, counts, status).await;
+        }
+        let word = Sign::Positive.word(counts);
         let Some((_, address)) = profile.file().place(register) else { return Ok(()) };
-        let before = self.agreed;
-        // What a start rests on from here on, whatever becomes of the write: another setpoint in its place is not this side's.
-        self.agreed = match setpoint {
-            Setpoint::Frequency(frequency) if profile.file().see.setpoint.given().is_some() => {
-                Some(frequency.centihertz().into())
-            }
-            _ => None,
-        };
+        let before = self.agree(setpoint);
         match self.registers.at(Class::Command).replacing(address).write_word(address, word).await {
             Err(error) if error.kind() == ErrorKind::NotSent => {
                 self.agreed = before;
@@ -58,6 +63,69 @@ impl<P: Port> ProfileDrive<P> {
         }
         self.registers.owe_judgement();
         self.see_setpoint(setpoint, word).await.map_err(Error::after_write)
+    }
+
+    /// What a start rests on from here on, whatever becomes of the write: another setpoint in its place is not this side's. Gives what it
+    /// rested on before.
+    fn agree(&mut self, setpoint: Setpoint) -> Option<i64> {
+        let shows = self.profile.file().see.setpoint.given().is_some();
+        let agreed = match setpoint {
+            Setpoint::Frequency(frequency) if shows => Some(frequency.centihertz().into()),
+            _ => None,
+        };
+        std::mem::replace(&mut self.agreed, agreed)
+    }
+
+    /// The setpoint of a drive whose run command it is. It is kept for the next start, and goes only to a motor that runs by this side's.
+    async fn give_run_command(&mut self, setpoint: Setpoint, counts: i32, status: Status) -> Result<()> {
+        let order = Order::Setpoint(setpoint);
+        let before = (self.agreed, self.kept);
+        let Some(lease) = self.watch.run.lease() else {
+            self.agree(setpoint);
+            self.kept = Some(counts);
+            return Err(self.not_confirmed(order, status, Some(KEPT)));
+        };
+        let lacks = matches!(status.verdict, None | Some(Verdict::NotInForce { .. }));
+        if lacks || status.state != State::Running {
+            return Err(self.refused(order, HELD_BACK));
+        }
+        let profile = self.profile.clone();
+        let Some(start) = profile.start(lease.direction) else { return Err(self.refused(order, HELD_BACK)) };
+        let word = profile.file().run_word(start, Some(counts)).unwrap_or(0);
+        let Some(step) = start.steps.last() else { return Err(self.refused(order, HELD_BACK)) };
+        self.agree(setpoint);
+        self.kept = Some(counts);
+        self.watch.run.give(Lease::new(lease.direction, word));
+        let sent = self.step(step.get_ref(), Class::Command, order).await;
+        self.registers.owe_judgement();
+        match sent {
+            Ok(()) => self.watch.run.was_written(),
+            Err(error) if error.kind() == ErrorKind::NotSent => {
+                self.watch.run.was_not_written();
+                (self.agreed, self.kept) = before;
+                return Err(error);
+            }
+            Err(error) => return Err(error.after_write()),
+        }
+        self.see_setpoint(setpoint, word).await.map_err(Error::after_write)
+    }
+
+    /// The setpoint that the bus has given, by whomever, where its register can be read and another shows the one in force.
+    pub(super) async fn setpoint_held(&mut self) -> Option<i64> {
+        let profile = self.profile.clone();
+        let file = profile.file();
+        let fact = file.setpoint.given()?.get_ref();
+        let (name, seen) = (fact.register.get_ref(), file.see.setpoint.given()?.get_ref());
+        let can = |name: &str| file.named(name).is_some_and(|register| register.access != Access::Write);
+        if name == seen || !can(name) || file.starts_by_setpoint() {
+            return None;
+        }
+        let mut words = self.limits(fact).await.ok()?;
+        for block in profile.blocks(&[name.as_str()].into()) {
+            let read = self.read_block(Class::Command, block).await.ok()?;
+            words.keep(block, read);
+        }
+        self.frequency(&words, name).map(|frequency| frequency.centihertz().into())
     }
 
     fn takes(&self, register: &Register, setpoint: Setpoint) -> Result<()> {
@@ -94,14 +162,14 @@ impl<P: Port> ProfileDrive<P> {
         Ok(words)
     }
 
-    /// The word that stands for a setpoint: exactly, and within what the drive, its profile and its owner allow.
-    fn setpoint_word(
+    /// The counts that stand for a setpoint: exactly, and within what the drive, its profile and its owner allow.
+    fn setpoint_counts(
         &self,
         fact: &Fact,
         register: &Register,
         setpoint: Setpoint,
         held: &Words,
-    ) -> Result<u16> {
+    ) -> Result<i32> {
         let slave = self.registers.slave();
         let problem = |problem| Error::Setpoint { slave, setpoint, problem };
         let refused = |reason| self.refused(Order::Setpoint(setpoint), reason);
@@ -133,12 +201,9 @@ impl<P: Port> ProfileDrive<P> {
         if !(i64::from(limits.low)..=high).contains(&count) {
             return Err(problem(self.outside(limits.low.into(), high, scale, setpoint)));
         }
-        let word = if register.signed {
-            i16::try_from(count).ok().map(i16::cast_unsigned)
-        } else {
-            u16::try_from(count).ok()
-        };
-        word.ok_or_else(|| problem(SetpointProblem::TooLarge))
+        let highest = if register.signed { i16::MAX.cast_unsigned() } else { u16::MAX };
+        let fits = u16::try_from(count).ok().filter(|count| *count <= highest);
+        fits.map(i32::from).ok_or_else(|| problem(SetpointProblem::TooLarge))
     }
 
     fn scale(&self, register: &Register) -> Result<[i64; 2]> {

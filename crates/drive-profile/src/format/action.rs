@@ -59,7 +59,9 @@ pub struct Step {
     pub words: Option<Vec<u16>>,
     /// The coils.
     pub coils: Option<Vec<bool>>,
-    /// The function, where it is not the one for so many.
+    /// Of a drive whose setpoint is its run command: the setpoint that was given goes out, with this sign. In the last step of a start.
+    pub setpoint: Option<Spanned<Sign>>,
+    /// The function, where it is not the one for so many. 23 reads the first register of the states along.
     pub function: Option<Spanned<u8>>,
     /// How long nothing is done, in ms.
     pub pause_ms: Option<Spanned<u16>>,
@@ -68,6 +70,17 @@ pub struct Step {
     pub awaits: Option<Bits>,
     /// For how long at the most, in ms.
     pub within_ms: Option<Spanned<u16>>,
+}
+
+/// With which sign a setpoint goes out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Sign {
+    /// As it was given.
+    Positive,
+    /// With the other sign.
+    Negative,
 }
 
 /// Its stops, each by the mode that it is.

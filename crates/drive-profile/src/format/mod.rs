@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use drive_core::State;
 use serde::Deserialize;
 
-pub use action::{Action, Acts, Command, Deed, ModeName, Rung, Start, Step, Stops};
+pub use action::{Action, Acts, Command, Deed, ModeName, Rung, Sign, Start, Step, Stops};
 pub use answer::Answer;
 pub use facts::{
     Bits, Codes, Direction, Faults, FedBy, Forbidden, Guard, Limits, Owner, Proves, Setpoint, Source, Tried,

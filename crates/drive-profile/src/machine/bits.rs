@@ -1,4 +1,4 @@
-//! Coils, inputs and input registers of a simulated drive: Modbus Application Protocol V1.1b3, sections 6.1, 6.2, 6.4, 6.5 and 6.11.
+//! Coils, inputs and input registers of a simulated drive: Modbus Application Protocol V1.1b3, sections 6.1, 6.2, 6.4, 6.5, 6.11 and 6.17.
 
 use drive_sim::Exception;
 
@@ -10,6 +10,7 @@ pub(super) trait Places {
     /// Coils or inputs that one read may ask for, and coils that one write may carry.
     fn most_bits(&self) -> (u16, u16);
     fn most_words(&self) -> u16;
+    fn most_written(&self) -> u16;
     fn read_at(&self, place: (Space, u16)) -> Result<u16, Exception>;
     fn takes(&self, place: (Space, u16)) -> Result<(), Exception>;
     fn write_at(&mut self, written: Written) -> Result<(), Exception>;
@@ -20,6 +21,7 @@ const READ_INPUTS: u8 = 0x02;
 const READ_INPUT_REGISTERS: u8 = 0x04;
 const WRITE_COIL: u8 = 0x05;
 const WRITE_COILS: u8 = 0x0F;
+const READ_WRITE: u8 = 0x17;
 
 /// What a coil is written to with, on and off.
 const ON: u16 = 0xFF00;
@@ -36,7 +38,15 @@ pub(super) fn answer(machine: &mut dyn Places, request: &[u8]) -> Result<Vec<u8>
             read_bits(machine, function, space, first, count)
         }
         [READ_INPUT_REGISTERS, a, b, c, d] => {
-            read_words(machine, u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]))
+            let (first, count) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
+            read_words(machine, READ_INPUT_REGISTERS, Space::InputRegister, first, count)
+        }
+        // The write comes before the read.
+        [READ_WRITE, a, b, c, d, e, f, g, h, bytes, ref data @ ..] => {
+            let (from, count) = (u16::from_be_bytes([e, f]), u16::from_be_bytes([g, h]));
+            write_words(machine, from, count, usize::from(bytes), data)?;
+            let (first, count) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
+            read_words(machine, READ_WRITE, Space::HoldingRegister, first, count)
         }
         [WRITE_COIL, a, b, c, d] => {
             let value = match u16::from_be_bytes([c, d]) {
@@ -81,18 +91,44 @@ fn read_bits(
     Ok(answer)
 }
 
-fn read_words(machine: &dyn Places, first: u16, count: u16) -> Result<Vec<u8>, Exception> {
+fn read_words(
+    machine: &dyn Places,
+    function: u8,
+    space: Space,
+    first: u16,
+    count: u16,
+) -> Result<Vec<u8>, Exception> {
     let most = machine.most_words();
     if count == 0 || count > most {
         return Err(Exception::ILLEGAL_VALUE);
     }
     let bytes = u8::try_from(2 * count).map_err(|_| Exception::ILLEGAL_VALUE)?;
-    let mut answer = vec![READ_INPUT_REGISTERS, bytes];
+    let mut answer = vec![function, bytes];
     for at in 0..count {
         let address = first.checked_add(at).ok_or(Exception::ILLEGAL_ADDRESS)?;
-        answer.extend(machine.read_at((Space::InputRegister, address))?.to_be_bytes());
+        answer.extend(machine.read_at((space, address))?.to_be_bytes());
     }
     Ok(answer)
+}
+
+fn write_words(
+    machine: &mut dyn Places,
+    first: u16,
+    count: u16,
+    bytes: usize,
+    data: &[u8],
+) -> Result<(), Exception> {
+    let fits = bytes == usize::from(count) * 2 && data.len() == bytes;
+    if count == 0 || count > machine.most_written() || !fits {
+        return Err(Exception::ILLEGAL_VALUE);
+    }
+    let words = data.chunks_exact(2).zip(0_u16..).map(|(word, at)| {
+        let value = u16::from_be_bytes(word.try_into().unwrap_or_default());
+        Some(Written { space: Space::HoldingRegister, address: first.checked_add(at)?, value })
+    });
+    let words: Vec<Written> = words.collect::<Option<_>>().ok_or(Exception::ILLEGAL_ADDRESS)?;
+    words.iter().try_for_each(|word| machine.takes((word.space, word.address)))?;
+    words.into_iter().try_for_each(|word| machine.write_at(word))
 }
 
 fn write_bits(

@@ -3,6 +3,7 @@
 mod console;
 mod protocol;
 mod steps;
+mod twin;
 
 use std::{
     fs,
@@ -31,26 +32,32 @@ use self::{console::Console, protocol::Protocol, steps::Steps};
 /// Each step is asked for, and a step further is only done where the one before was right. The motor is started by this program in
 /// the last step alone, when the profile reaches motion and somebody has confirmed by the drive's name that the motor is uncoupled.
 /// What was seen is written into the file, signed with name, drive, firmware and day. Ctrl-C ends it, with the motor stopped.
+///
+/// With --sim the simulated drive that is made from the same file is driven instead: that needs no line, no motor and no person, and shows
+/// whether the file agrees with itself.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The profile: its file, into which the protocol is written, or the key of one that is shipped
     #[arg(value_name = "PROFILE")]
     profile: String,
+    /// On the simulated drive that is made from the same file, and on no line; nothing is signed
+    #[arg(long, conflicts_with_all = ["line", "address", "person", "drive", "firmware"])]
+    sim: bool,
     // The text has brackets that a doc comment would take for links.
-    #[arg(long, value_name = "LINE", help = line_spec::HELP)]
-    line: LineSpec,
+    #[arg(long, value_name = "LINE", help = line_spec::HELP, required_unless_present = "sim")]
+    line: Option<LineSpec>,
     /// The drive's address
-    #[arg(long, value_name = "ADDRESS")]
-    address: u8,
+    #[arg(long, value_name = "ADDRESS", required_unless_present = "sim")]
+    address: Option<u8>,
     /// Who tries it
-    #[arg(long, value_name = "PERSON")]
-    person: String,
+    #[arg(long, value_name = "PERSON", required_unless_present = "sim")]
+    person: Option<String>,
     /// On which drive, with its rating
-    #[arg(long, value_name = "TEXT")]
-    drive: String,
+    #[arg(long, value_name = "TEXT", required_unless_present = "sim")]
+    drive: Option<String>,
     /// Its firmware, as its display shows it
-    #[arg(long, value_name = "TEXT")]
-    firmware: String,
+    #[arg(long, value_name = "TEXT", required_unless_present = "sim")]
+    firmware: Option<String>,
     /// The speed of the start
     #[arg(long, value_name = "FREQUENCY", default_value = "5Hz")]
     lowest: Frequency,
@@ -60,11 +67,29 @@ pub struct Args {
 
 pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let (text, file) = text(&args.profile)?;
-    let slave = SlaveAddress::try_from(args.address).map_err(|error| Failure::Input(error.to_string()))?;
+    if args.sim {
+        let profile = drive_profile::read(&text).map_err(|refusals| Failure::Input(refusals.to_string()))?;
+        return twin::try_on_twin(profile).await;
+    }
+    // Without --sim all of them are there.
+    let Args {
+        line: Some(line),
+        address: Some(address),
+        person: Some(person),
+        drive: Some(drive),
+        firmware: Some(firmware),
+        ..
+    } = &args
+    else {
+        return Err(Failure::Input(
+            "a trial on the drive needs --line, --address, --person, --drive and --firmware".to_owned(),
+        ));
+    };
+    let slave = SlaveAddress::try_from(*address).map_err(|error| Failure::Input(error.to_string()))?;
     let mut protocol = Protocol {
-        person: args.person.clone(),
-        drive: args.drive.clone(),
-        firmware: args.firmware.clone(),
+        person: person.clone(),
+        drive: drive.clone(),
+        firmware: firmware.clone(),
         day: chrono::Local::now().format("%Y-%m-%d").to_string(),
         seen: Vec::new(),
     };
@@ -72,12 +97,12 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let (_, tried) = protocol.written_into(&text).map_err(Failure::Input)?;
     let name = DriveName { family: family(tried), slave };
     let options = args.options.of(&[name])?;
-    let config = args.line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
-    let line = open_line_of(Some(name), config.clone()).await?;
+    let config = line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
+    let opened = open_line_of(Some(name), config.clone()).await?;
     let mut console = Console::of_terminal();
-    let steps = Steps { name, line: line.clone(), config, options, lowest: args.lowest };
+    let steps = Steps { name, line: opened.clone(), config, options, lowest: args.lowest };
     let climbed = steps.climb(&mut console, &mut protocol.seen).await;
-    close(&line).await;
+    close(&opened).await;
     climbed?;
     let (with, profile) = protocol.written_into(&text).map_err(Failure::Input)?;
     output::say(format_args!("{}: it reaches {} now", profile.key(), profile.level()))?;

@@ -1,0 +1,292 @@
+//! Patterns of control that few drives have: the setpoint as the run command, a watchdog that a command word feeds, function 23. And what a
+//! start by a file has to be seen by.
+
+use std::{sync::Arc, time::Duration};
+
+use drive_core::{Direction, Error, ErrorKind, Frequency, State, StopMode, Verdict};
+use drive_families::{Family, Options, SetUp};
+use drive_profile::{Level, Profile, definition, read, shipped};
+use drive_sim::Panel;
+use drive_testing::{Contract, rig::Rig};
+use tokio::time::{Instant, sleep};
+
+const SIGNED: &str = include_str!("data/signed.toml");
+const SPLIT: &str = include_str!("data/split.toml");
+
+/// Where the drive of `signed.toml` takes its setpoint.
+const SPEED: u16 = 0x000E;
+/// Where a Danfoss takes its control word, and its words: FC 102 Design Guide p. 144-146.
+const CTW: u16 = 49_999;
+const RUN: u16 = 0x047C;
+const STOP: u16 = 0x043C;
+
+fn profile(text: &str) -> Profile {
+    read(text).unwrap_or_else(|refusals| panic!("{refusals}"))
+}
+
+fn rig(profile: Profile, said: &[(&str, &str)]) -> Rig {
+    let family = Family::new(definition(&Arc::new(profile)));
+    // Its options are known once it is.
+    family.exchange().expect("no family that is built in has its name");
+    let mut options = family.simulated_options();
+    for (name, value) in said {
+        options.set(name, value).expect("it is an option of a profile");
+    }
+    let open = move |port, slave| family.open_with(port, slave, &options);
+    Contract::new(family.capabilities(), open, move || {
+        family.machine(SetUp::ForTheBus).expect("it has a twin")
+    })
+    .rig()
+}
+
+/// The words that were written to a register since then, function 06, 10h or 17h with one word, in their order.
+fn written_since(rig: &Rig, register: u16, since: Instant) -> Vec<u16> {
+    let words = rig.machine.received_since(since).into_iter().filter_map(|request| {
+        let (at, word) = match request.pdu[..] {
+            [0x06, a, b, c, d] | [0x10, a, b, _, _, _, c, d] | [0x17, _, _, _, _, a, b, _, _, _, c, d] => {
+                (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]))
+            }
+            _ => return None,
+        };
+        (at == register).then_some(word)
+    });
+    words.collect()
+}
+
+/// The same while the drive is polled for a time: the machine remembers its last requests alone.
+async fn written_while(rig: &mut Rig, register: u16, time: Duration) -> Vec<u16> {
+    const SLICE: Duration = Duration::from_millis(500);
+    let (until, mut words) = (Instant::now() + time, Vec::new());
+    while Instant::now() < until {
+        let since = Instant::now();
+        rig.poll_for(SLICE).await;
+        words.extend(written_since(rig, register, since));
+        // The next slice begins behind this one's last request.
+        sleep(Duration::from_millis(1)).await;
+    }
+    words
+}
+
+/// Started, turned round, stopped, tripped, reset and lost. Its setpoint goes out with a start, and to a motor that runs by it; never else.
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_that_is_the_run_command_is_kept_until_a_start() {
+    let profile = profile(SIGNED);
+    assert_eq!(profile.level(), Level::Motion, "{:#?}", profile.gaps());
+    let mut rig = rig(profile, &[]);
+    let refused = rig.drive.start(Direction::Forward).await.expect_err("no setpoint was given");
+    assert_eq!(refused.kind(), ErrorKind::Refused, "{refused}");
+    let kept = rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect_err("nothing shows it");
+    assert!(matches!(kept, Error::NotConfirmed { .. }) && kept.to_string().contains("run command"), "{kept}");
+    let words = written_while(&mut rig, SPEED, Duration::from_secs(2)).await;
+    assert!(words.is_empty() && !rig.machine.observe().running, "nothing was asked for: {words:?}");
+
+    let began = Instant::now();
+    let started = rig.drive.start(Direction::Forward).await.expect("it starts");
+    assert_eq!((started.state, written_since(&rig, SPEED, began)), (State::Running, vec![300]));
+    rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == 3_000).await;
+    assert_eq!(rig.drive.status().await.expect("it answers").verdict, Some(Verdict::InForce));
+    rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("the motor runs by it");
+    rig.until_machine("it follows", |machine| machine.output_frequency == 2_000).await;
+    assert_eq!(rig.drive.status().await.expect("it answers").verdict, Some(Verdict::InForce));
+
+    rig.drive.start(Direction::Reverse).await.expect("it is turned round");
+    rig.until_machine("it turns round", |machine| machine.output_frequency == -2_000).await;
+    let status = rig.drive.status().await.expect("it answers");
+    assert_eq!((status.direction, status.verdict), (Some(Direction::Reverse), Some(Verdict::InForce)));
+
+    sleep(Duration::from_millis(1)).await;
+    let began = Instant::now();
+    let stopped = rig.drive.stop(StopMode::Ramp).await.expect("it stops");
+    assert_eq!((stopped.mode, rig.drive.lease()), (StopMode::Ramp, None));
+    assert_eq!(written_since(&rig, SPEED, began), [0]);
+    rig.until_machine("it stands", |machine| machine.shaft_frequency == 0).await;
+    rig.drive.set_setpoint(Frequency::from_hertz(10).into()).await.expect_err("it is kept");
+    rig.poll_for(Duration::from_secs(2)).await;
+    assert!(!rig.machine.observe().running, "a setpoint is no start");
+
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.machine.trip(1);
+    rig.until("the trip", |status| status.state == State::Fault).await;
+    sleep(Duration::from_millis(1)).await;
+    let began = Instant::now();
+    let refused = rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect_err("it has tripped");
+    assert_eq!(
+        (refused.kind(), written_since(&rig, SPEED, began)),
+        (ErrorKind::Refused, vec![]),
+        "{refused}"
+    );
+    rig.drive.reset_faults().await.expect("it is reset");
+    rig.poll_for(Duration::from_secs(2)).await;
+    assert!(!rig.machine.observe().running, "a reset is no start");
+
+    rig.drive.start(Direction::Forward).await.expect("what was kept is kept");
+    rig.machine.mute();
+    rig.drive.status().await.expect_err("nobody answers");
+    rig.machine.power_cycle();
+    rig.machine.unmute();
+    rig.drive.forget();
+    sleep(Duration::from_millis(1)).await;
+    let mut words = written_while(&mut rig, SPEED, Duration::from_secs(3)).await;
+    let began = Instant::now();
+    let refused = rig.drive.start(Direction::Forward).await.expect_err("another drive may be there");
+    words.extend(written_since(&rig, SPEED, began));
+    assert_eq!((refused.kind(), words), (ErrorKind::Refused, vec![]), "{refused}");
+    assert!(!rig.machine.observe().running);
+}
+
+/// Another master's setpoint in its place is another run command.
+#[tokio::test(start_paused = true)]
+async fn a_run_command_that_is_a_setpoint_is_not_in_force_once_another_stands_there() {
+    let mut rig = rig(profile(SIGNED), &[]);
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect_err("it is kept");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.machine.written_by_another(SPEED, 200).expect("it takes it");
+    let verdict = rig.drive.status().await.expect("it answers").verdict;
+    assert!(matches!(verdict, Some(Verdict::NotInForce { .. })), "{verdict:?}");
+}
+
+/// The write and the reading of its state in one exchange: Modbus Application Protocol V1.1b3, section 6.17.
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_is_commanded_by_function_23_is_started_and_stopped_by_it() {
+    let text =
+        SIGNED.replace("setpoint = \"positive\" }", "setpoint = \"positive\", function = 23 }").replace(
+            "{ write = \"SPEED\", words = [0] }], seen",
+            "{ write = \"SPEED\", words = [0], function = 23 }], seen",
+        );
+    let mut rig = rig(profile(&text), &[]);
+    let begun = Instant::now();
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect_err("it is kept");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == 3_000).await;
+    rig.drive.stop(StopMode::Ramp).await.expect("it stops");
+    rig.until_machine("it stands", |machine| machine.shaft_frequency == 0).await;
+    let by_23 =
+        rig.machine.received().into_iter().filter(|request| request.pdu.first() == Some(&0x17)).count();
+    assert!(
+        by_23 >= 2 && written(&rig, SPEED).first() == Some(&300) && written(&rig, SPEED).last() == Some(&0)
+    );
+}
+
+async fn fed(time: &str) -> Rig {
+    let mut rig =
+        rig(shipped::find("danfoss-fc").expect("it is shipped").clone(), &[("watchdog-time", time)]);
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig
+}
+
+/// Danfoss: an updated control word alone feeds (FC 102 and FC 202 guides); of 2 s there are never two without one.
+#[tokio::test(start_paused = true)]
+async fn a_watchdog_that_a_command_word_feeds_is_fed_while_the_motor_is_seen_to_run() {
+    let mut rig = fed("2s").await;
+    let words = written_while(&mut rig, CTW, Duration::from_secs(12)).await;
+    assert!((7..=24).contains(&words.len()) && words.iter().all(|word| *word == RUN), "{words:?}");
+    assert_eq!(rig.machine.observe().output_frequency, 3_000);
+    // Behind a stop of this side the stop is repeated, so that the drive does not trip at rest, and never the run word.
+    rig.drive.stop(StopMode::Ramp).await.expect("it stops");
+    sleep(Duration::from_millis(1)).await;
+    let words = written_while(&mut rig, CTW, Duration::from_secs(12)).await;
+    assert!(words.len() >= 4 && words.iter().all(|word| *word == STOP), "{words:?}");
+    assert!(!rig.machine.observe().running);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_watchdog_of_which_nobody_has_told_is_not_fed() {
+    let mut rig = rig(shipped::find("danfoss-fc").expect("it is shipped").clone(), &[]);
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    sleep(Duration::from_millis(1)).await;
+    let words = written_while(&mut rig, CTW, Duration::from_secs(12)).await;
+    assert!(words.is_empty(), "{words:?}");
+}
+
+/// A level-start drive would restart by a run word that is repeated at the wrong moment.
+#[tokio::test(start_paused = true)]
+async fn no_run_word_is_repeated_behind_a_power_cycle_a_trip_a_panel_or_another_masters_stop() {
+    type Deed = fn(&mut Rig);
+    let deeds: [(&str, Deed); 4] = [
+        ("a power cycle", |rig| rig.machine.power_cycle()),
+        ("a trip", |rig| rig.machine.trip(9)),
+        ("the panel", |rig| rig.machine.panel(Panel::TakeControl)),
+        ("another master", |rig| rig.machine.written_by_another(CTW, STOP).expect("it takes it")),
+    ];
+    for (name, deed) in deeds {
+        for polls in [1_u64, 7, 13] {
+            let mut rig = fed("2s").await;
+            rig.poll_for(Duration::from_secs(4) + Duration::from_millis(50 * polls)).await;
+            sleep(Duration::from_millis(1)).await;
+            deed(&mut rig);
+            let words = written_while(&mut rig, CTW, Duration::from_secs(8)).await;
+            assert!(words.is_empty() && !rig.machine.observe().running, "{name} at {polls}: {words:?}");
+            // The line is lost and comes back: what is found is what is there.
+            rig.drive.forget();
+            rig.poll_for(Duration::from_secs(4)).await;
+            assert!(
+                written(&rig, CTW).split_off(before).is_empty() && !rig.machine.observe().running,
+                "{name}"
+            );
+        }
+    }
+}
+
+/// A word beside the command word says nothing of what stands there: here the reset of split registers, which has no effect.
+#[tokio::test(start_paused = true)]
+async fn a_word_for_another_register_is_not_taken_for_the_command_that_stands() {
+    let other = "[register.OTHER]\nwhat = \"another\"\naddress = 0x091E\naccess = \"write\"\nstorage = \"ram\"\nsource = \"made\"\n\n[register.RUN]\n";
+    let machine =
+        SPLIT.replace("address = 0x091E", "address = 0x0A1E").replacen("[register.RUN]\n", other, 1);
+    let mut rig = rig_of(&machine, SPLIT);
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.machine.trip(1);
+    rig.until("the trip", |status| status.state == State::Fault).await;
+    rig.drive.reset_faults().await.expect_err("its cause stands");
+    let verdict = rig.drive.status().await.expect("it answers").verdict;
+    assert_eq!((verdict, rig.drive.lease()), (None, None), "its run command was taken back by this side");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_of_a_drive_whose_reference_is_elsewhere_is_refused() {
+    let local = SPLIT.replace("mask = 0x0100, value = 0x0100", "mask = 0x0100, value = 0x0000");
+    let mut rig = rig_of(SPLIT, &local);
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    let began = Instant::now();
+    let refused = rig.drive.start(Direction::Forward).await.expect_err("its reference is elsewhere");
+    assert_eq!(
+        (refused.kind(), written_since(&rig, 0x091B, began)),
+        (ErrorKind::Refused, vec![]),
+        "{refused}"
+    );
+}
+
+/// The machine of one text, driven by another.
+fn rig_of(machine: &str, text: &str) -> Rig {
+    let machine = Family::new(definition(&Arc::new(profile(machine))));
+    let family = Family::new(definition(&Arc::new(profile(text))));
+    let options = Options::default();
+    let open = move |port, slave| family.open_with(port, slave, &options);
+    Contract::new(family.capabilities(), open, move || {
+        machine.machine(SetUp::ForTheBus).expect("it has a twin")
+    })
+    .rig()
+}
+
+/// Another register shows the setpoint in force, and an input or another master has changed it: what the bus has given is not it.
+#[tokio::test(start_paused = true)]
+async fn a_start_at_another_setpoint_than_stands_in_its_register_is_not_confirmed() {
+    let seen = "[register.SEEN]\nwhat = \"setpoint in force\"\naddress = 0x0120\naccess = \"read\"\nunit = \"Hz\"\nscale = [1, 10]\nsource = \"made\"\n\n[register.RUN]\n";
+    let text =
+        SPLIT.replace("setpoint = \"SPEED\"", "setpoint = \"SEEN\"").replacen("[register.RUN]\n", seen, 1);
+    // The machine takes its setpoint from another place than the one that this side reads and writes.
+    let machine = text.replace("address = 0x091A", "address = 0x0A1A");
+    let both = "[register.OTHER]\nwhat = \"another\"\naddress = 0x091A\naccess = \"read_write\"\nstorage = \"ram\"\nsource = \"made\"\n\n[register.RUN]\n";
+    let machine = machine.replacen("[register.RUN]\n", both, 1);
+    let mut rig = rig_of(&machine, &text);
+    rig.machine.written_by_another(0x0A1A, 100).expect("a preset of 10 Hz");
+    rig.machine.written_by_another(0x091A, 300).expect("30 Hz by the bus");
+    let error = rig.drive.start(Direction::Forward).await.expect_err("it runs at 10 Hz");
+    assert!(
+        matches!(error, Error::NotConfirmed { .. }) && error.to_string().contains("another setpoint"),
+        "{error}"
+    );
+}

@@ -1,0 +1,517 @@
+//! Drives that were written by another hand, in another language, from the documents alone, driven by our engine through the profiles that are
+//! shipped: started, turned round, stopped, tripped, reset, lost, without power, taken at the panel. What the engine says is held against the
+//! shaft that the stranger prints.
+#![cfg(unix)]
+
+use std::{
+    collections::VecDeque,
+    fmt::Write as _,
+    process::Stdio,
+    sync::{Arc, Mutex},
+    time::Duration,
+};
+
+use drive_bus::{Line, LineConfig};
+use drive_core::{
+    Direction, Drive, Error, ErrorKind, Frequency, Motion, SerialSettings, SlaveAddress, State, Status,
+    StopMode, Verdict,
+};
+use drive_families::{Family, Options};
+use drive_profile::{Level, definition, shipped};
+use support::peers;
+use tokio::{
+    io::{AsyncBufReadExt as _, AsyncWriteExt as _, BufReader},
+    process::{Child, ChildStdin, Command},
+    sync::mpsc,
+    time::{Instant, sleep, timeout},
+};
+
+/// How far apart a look at the drive and what its stranger printed may be on a busy machine.
+const APART: Duration = Duration::from_millis(700);
+
+/// A stranger, and the profile that drives it.
+struct Kind {
+    key: &'static str,
+    script: &'static str,
+    arguments: &'static [&'static str],
+    /// What its owner says.
+    options: &'static [(&'static str, &'static str)],
+    /// A trip that can be reset.
+    trip: u16,
+    /// The words by which another master starts one that the profile only stops: register and word.
+    others: &'static [(u16, u16)],
+    /// What its owner writes each time it was switched on.
+    enables: &'static [(u16, u16)],
+}
+
+const fn kind(key: &'static str, script: &'static str) -> Kind {
+    Kind {
+        key,
+        script,
+        arguments: &[],
+        options: &[("commands-alone", "yes"), ("full-scale", "50Hz"), ("highest", "50Hz")],
+        trip: 9,
+        others: &[],
+        enables: &[],
+    }
+}
+
+/// What a stranger printed of itself.
+#[derive(Debug, Clone, PartialEq)]
+struct Truth {
+    hertz: f64,
+    running: bool,
+    direction: Direction,
+    tripped: bool,
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_v20() {
+    life(kind("v20", "v20.py")).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_wj200() {
+    life(kind("wj200", "wj200.py")).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_mx2() {
+    life(kind("mx2", "wj200.py")).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_danfoss_fc_102() {
+    life(Kind { arguments: &["102"], ..kind("danfoss-fc", "danfoss.py") }).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_danfoss_fc_51() {
+    life(Kind { arguments: &["51"], ..kind("danfoss-fc51", "danfoss.py") }).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_goodrive() {
+    life(kind("goodrive", "goodrive.py")).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_ms300() {
+    // Forward run, A. p. 786; 30 Hz.
+    life(Kind { others: &[(0x2001, 3_000), (0x2000, 0x12)], trip: 1, ..kind("ms300", "ms300.py") }).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_vf_s15() {
+    life(Kind { arguments: &["s15"], ..kind("vfs15", "toshiba.py") }).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_altivar_320() {
+    life(Kind { arguments: &["320"], ..kind("altivar", "altivar.py") }).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_ig5a() {
+    // Printed 0004, write enable: 0 at power-up.
+    life(Kind { enables: &[(3, 1)], trip: 1, ..kind("ig5a", "ig5a.py") }).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_g120() {
+    // Its works setting trips it within 100 ms of silence. 40101 of 4000h is 100 %; 047Eh, then 047Fh at 40100.
+    life(Kind {
+        arguments: &["--set", "p2040=0"],
+        others: &[(100, 0x2666), (99, 0x047E), (99, 0x047F)],
+        ..kind("g120", "g120.py")
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_a1000() {
+    // 0002h in 0.01 Hz, 0001h bit 0 runs forward: SIEPC71061627 p. 559.
+    life(Kind { others: &[(2, 3_000), (1, 1)], ..kind("a1000", "yaskawa.py") }).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_acs550() {
+    // The ABB Drives profile: 0406h, 0407h, 046Fh; REF1 of 20000 is 100 %.
+    life(Kind {
+        arguments: &["550"],
+        others: &[(0, 0x0406), (1, 12_000), (0, 0x0407), (0, 0x046F)],
+        trip: 1,
+        ..kind("acs550", "abb.py")
+    })
+    .await;
+}
+
+/// The whole life of one.
+async fn life(kind: Kind) {
+    let Some(python) = peers::python_with("pymodbus") else { return };
+    let mut stage = Stage::begin(&python, kind).await;
+    stage.enable().await;
+    let level = shipped::find(stage.kind.key).expect("it is shipped").level();
+    stage.look_for("standing", Duration::from_secs(1)).await;
+    if level == Level::Motion {
+        stage.is_driven().await;
+    } else {
+        stage.is_stopped_alone().await;
+    }
+    stage.end();
+}
+
+struct Stage {
+    kind: Kind,
+    drive: Box<dyn Drive>,
+    line: Line,
+    stdin: ChildStdin,
+    printed: Arc<Mutex<VecDeque<(Instant, Truth)>>>,
+    /// What the engine came to, step by step.
+    told: String,
+    contradictions: Vec<String>,
+    _child: Child,
+}
+
+impl Stage {
+    async fn begin(python: &std::path::Path, kind: Kind) -> Self {
+        let mut child = Command::new(python)
+            .arg(peers::script("strangers").join(kind.script))
+            .args(kind.arguments)
+            .args(["--tcp", "0", "--ramp", "2", "--coast", "3"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .kill_on_drop(true)
+            .spawn()
+            .expect("the stranger can be run");
+        let stdin = child.stdin.take().expect("it is piped");
+        let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
+        let ready = lines.next_line().await.expect("it speaks").expect("it is ready");
+        let ready: serde_json::Value = serde_json::from_str(&ready).expect("it speaks JSON");
+        let port = ready["tcp"].as_u64().expect("it names its port");
+        let printed = Arc::new(Mutex::new(VecDeque::new()));
+        let (to, (first, mut seen)) = (printed.clone(), mpsc::channel(1));
+        tokio::spawn(async move {
+            while let Ok(Some(line)) = lines.next_line().await {
+                let Ok(value) = serde_json::from_str::<serde_json::Value>(&line) else { continue };
+                let truth = Truth {
+                    hertz: value["shaft_hz"].as_f64().unwrap_or(f64::NAN),
+                    running: value["running"] == true,
+                    direction: if value["direction"] == "reverse" {
+                        Direction::Reverse
+                    } else {
+                        Direction::Forward
+                    },
+                    tripped: value["tripped"] == true,
+                };
+                to.lock().expect("no panic").push_back((Instant::now(), truth));
+                first.try_send(()).ok();
+            }
+        });
+        seen.recv().await.expect("it prints its shaft");
+        let profile = shipped::find(kind.key).expect("it is shipped").clone();
+        let family = Family::new(definition(&Arc::new(profile)));
+        // Its options are known once it is.
+        family.exchange().expect("no family that is built in has its name");
+        let mut options = Options::default();
+        for (name, value) in kind.options {
+            options.set(name, value).expect("it is an option of a profile");
+        }
+        let config = LineConfig::rtu_over_tcp(format!("127.0.0.1:{port}"), SerialSettings::MODBUS_DEFAULT);
+        let line = Line::open(config).await.expect("it opens");
+        let slave = SlaveAddress::try_from(1).expect("it is one");
+        let drive = family.open_with(line.slave(1), slave, &options);
+        Self {
+            kind,
+            drive,
+            line,
+            stdin,
+            printed,
+            told: String::new(),
+            contradictions: Vec::new(),
+            _child: child,
+        }
+    }
+
+    /// What its owner does each time it was switched on.
+    async fn enable(&mut self) {
+        self.write_as_another(self.kind.enables).await;
+    }
+
+    async fn write_as_another(&self, words: &[(u16, u16)]) {
+        use tokio_modbus::client::Writer as _;
+        let mut other = tokio_modbus::client::Context::from(self.line.slave(1));
+        for &(register, word) in words {
+            other.write_single_register(register, word).await.expect("it answers").expect("it takes it");
+            sleep(Duration::from_millis(150)).await;
+        }
+    }
+
+    /// Whatever its profile lets be done.
+    async fn is_driven(&mut self) {
+        let key = self.kind.key;
+        self.set_setpoint(30).await;
+        self.start(Direction::Forward).await;
+        self.until("30 Hz forward", |truth| truth.hertz > 29.5).await;
+        let reverses = self.drive.run_word_for(Direction::Reverse).is_some();
+        if reverses {
+            self.start(Direction::Reverse).await;
+            self.until("30 Hz in reverse", |truth| truth.hertz < -29.5).await;
+            self.start(Direction::Forward).await;
+            self.until("30 Hz forward again", |truth| truth.hertz > 29.5).await;
+        }
+        self.set_setpoint(20).await;
+        self.until("20 Hz", |truth| truth.hertz < 20.5).await;
+        self.stop().await;
+
+        self.start(Direction::Forward).await;
+        self.until("20 Hz", |truth| truth.hertz > 19.5).await;
+        self.say(&format!("trip {}", self.kind.trip)).await;
+        self.until("the trip", |truth| truth.tripped).await;
+        let status = self.until_status("the trip is told", |status| status.state == State::Fault).await;
+        self.note("tripped", &format!("{:?}", status.fault_code));
+        let refused = self.drive.start(Direction::Forward).await;
+        self.claim(refused.is_err(), "a start of a drive that has tripped is confirmed");
+        self.until("the shaft stands", |truth| truth.hertz == 0.0).await;
+        let reset = self.drive.reset_faults().await;
+        self.note("reset", &outcome(&reset));
+        self.settle(Duration::from_millis(2_500)).await;
+        let now = self.now();
+        self.claim(reset.is_err() || !now.tripped, "a reset is confirmed, and it has tripped still");
+        assert!(!now.tripped, "{key}: {}", self.told);
+        self.look_for("behind the reset", Duration::from_secs(2)).await;
+        self.claim(!self.ran_within(Duration::from_secs(2)), "the motor was started by a reset");
+
+        // Out of sight, with the run command that stands.
+        self.set_setpoint(20).await;
+        self.start(Direction::Forward).await;
+        self.until("20 Hz", |truth| truth.hertz > 19.5).await;
+        self.say("deaf 3").await;
+        self.until_lost().await;
+        self.drive.forget();
+        self.until_answer().await;
+        self.look_for("back", Duration::from_secs(1)).await;
+        self.stop().await;
+
+        // A power cycle in the middle: nothing starts it again.
+        self.start(Direction::Forward).await;
+        self.until("20 Hz", |truth| truth.hertz > 19.5).await;
+        self.say("power off").await;
+        self.until_lost().await;
+        self.drive.forget();
+        self.say("power on").await;
+        self.until_answer().await;
+        self.enable().await;
+        self.until("the shaft stands", |truth| truth.hertz == 0.0).await;
+        self.look_for("behind the power cycle", Duration::from_secs(3)).await;
+        self.claim(!self.ran_within(Duration::from_secs(3)), "the motor was started behind a power cycle");
+        let withdrawn = self.drive.withdraw().await;
+        self.note("withdraw", &outcome(&withdrawn));
+
+        // The panel runs it: no run command of this side is in force then, and none is given.
+        self.say("panel 15").await;
+        self.until("15 Hz", |truth| truth.hertz.abs() > 14.5).await;
+        self.look_for("at the panel", Duration::from_secs(1)).await;
+        let taken = self.drive.start(Direction::Reverse).await;
+        self.note("start at the panel", &outcome(&taken));
+        self.claim(taken.is_err(), "a start of a drive that its panel runs is confirmed");
+        self.say("remote").await;
+        self.look_for("back from the panel", Duration::from_secs(3)).await;
+        let stopped = self.drive.stop(StopMode::Ramp).await;
+        self.note("stop", &outcome(&stopped));
+        self.until("it stands", |truth| truth.hertz == 0.0).await;
+    }
+
+    /// A drive that the profile only stops: another master runs it.
+    async fn is_stopped_alone(&mut self) {
+        let started = self.drive.start(Direction::Forward).await;
+        self.claim(
+            matches!(&started, Err(error) if error.kind() == ErrorKind::Unsupported),
+            "a start beyond its level",
+        );
+        self.write_as_another(self.kind.others).await;
+        self.until("another master runs it", |truth| truth.hertz > 15.0).await;
+        self.look_for("run by another", Duration::from_secs(1)).await;
+        self.stop().await;
+    }
+
+    async fn set_setpoint(&mut self, hertz: u32) {
+        let set = self.drive.set_setpoint(Frequency::from_hertz(hertz).into()).await;
+        self.note(&format!("{hertz} Hz"), &outcome(&set));
+        // Of some drives nothing shows a setpoint before they run: that is said, and is no refusal.
+        let fits = set.is_ok() || matches!(set, Err(Error::NotConfirmed { .. }));
+        assert!(fits, "{}: {}", self.kind.key, self.told);
+    }
+
+    async fn start(&mut self, direction: Direction) {
+        let started = self.drive.start(direction).await;
+        self.note(&format!("start {direction}"), &outcome(&started));
+        assert!(started.is_ok(), "{}: {}", self.kind.key, self.told);
+        self.look_for("started", Duration::from_millis(300)).await;
+        self.claim(self.now().running, "a start is confirmed, and its output is off");
+    }
+
+    async fn stop(&mut self) {
+        // A stop that takes longer to show than it is waited for is repeated, as the fleet does.
+        for _ in 0..5 {
+            let stopped = self.drive.stop(StopMode::Ramp).await;
+            self.note("stop", &outcome(&stopped));
+            if stopped.is_ok() {
+                break;
+            }
+        }
+        self.claim(self.drive.lease().is_none(), "a stop leaves a run command");
+        self.until("it stands", |truth| truth.hertz == 0.0 && !truth.running).await;
+        self.look_for("stopped", Duration::from_millis(500)).await;
+    }
+
+    /// Looks at the drive for a while, each look held against the shaft.
+    async fn look_for(&mut self, what: &str, time: Duration) {
+        let until = Instant::now() + time;
+        while Instant::now() < until {
+            if let Err(error) = self.look().await {
+                self.note(what, &error.to_string());
+            }
+            sleep(Duration::from_millis(50)).await;
+        }
+    }
+
+    async fn look(&mut self) -> Result<Status, Error> {
+        let before = Instant::now();
+        let status = self.drive.status().await?;
+        let after = Instant::now();
+        // What it prints of this moment may come a little later.
+        sleep(Duration::from_millis(120)).await;
+        self.judge(&status, before, after);
+        Ok(status)
+    }
+
+    /// What is said that was so at no time around the look.
+    fn judge(&mut self, status: &Status, before: Instant, after: Instant) {
+        let around = self.around(before.checked_sub(APART).unwrap_or(before), after + APART);
+        let ever = |is: &dyn Fn(&Truth) -> bool| around.iter().any(is);
+        let mut lies = Vec::new();
+        let driven = matches!(status.motion, Motion::Driven) || status.state == State::Running;
+        if driven && !ever(&|truth| truth.running) {
+            lies.push("it is told to run, and its output is off".to_owned());
+        }
+        if status.motion == Motion::AtRest && !ever(&|truth| truth.hertz.abs() < 1.0) {
+            lies.push("it is told at rest, and it turns".to_owned());
+        }
+        if status.is_fault() && !ever(&|truth| truth.tripped) {
+            lies.push("it is told to have tripped, and has not".to_owned());
+        }
+        if !status.is_fault() && status.state != State::Unknown && !ever(&|truth| !truth.tripped) {
+            lies.push("it has tripped, and that is not told".to_owned());
+        }
+        if status.verdict == Some(Verdict::InForce) && !ever(&|truth| truth.running) {
+            lies.push("a run command is told in force, and its output is off".to_owned());
+        }
+        if let Some(output) = status.output_frequency {
+            let hertz = f64::from(output.centihertz()) / 100.0;
+            let fits =
+                |truth: &Truth| (truth.hertz.abs() - hertz).abs() < 3.0 || (!truth.running && hertz == 0.0);
+            if !ever(&fits) {
+                lies.push(format!("it is told to have {hertz} Hz"));
+            }
+        }
+        if let (Some(direction), true) = (status.direction, status.state == State::Running) {
+            if !ever(&|truth| truth.direction == direction || truth.hertz.abs() < 1.0) {
+                lies.push(format!("it is told to turn {direction}"));
+            }
+        }
+        for lie in lies {
+            self.contradictions.push(format!("{lie}: {status:?}, around it {around:?}"));
+        }
+    }
+
+    /// What was printed between the two, and what stood at the first.
+    fn around(&self, from: Instant, to: Instant) -> Vec<Truth> {
+        let printed = self.printed.lock().expect("no panic");
+        let stood = printed.iter().rev().find(|(at, _)| *at <= from);
+        let between = printed.iter().filter(|(at, _)| *at > from && *at <= to);
+        stood.into_iter().chain(between).map(|(_, truth)| truth.clone()).collect()
+    }
+
+    fn now(&self) -> Truth {
+        self.printed.lock().expect("no panic").back().expect("it has printed").1.clone()
+    }
+
+    fn ran_within(&self, time: Duration) -> bool {
+        let from = Instant::now().checked_sub(time).unwrap_or_else(Instant::now);
+        self.around(from, Instant::now()).iter().any(|truth| truth.running)
+    }
+
+    async fn settle(&mut self, time: Duration) {
+        let until = Instant::now() + time;
+        while Instant::now() < until {
+            // A drive that starts anew behind a reset does not answer.
+            self.look().await.ok();
+            sleep(Duration::from_millis(50)).await;
+        }
+    }
+
+    async fn until(&mut self, what: &str, is_so: impl Fn(&Truth) -> bool) {
+        let told = timeout(Duration::from_secs(30), async {
+            while !is_so(&self.now()) {
+                self.look().await.ok();
+                sleep(Duration::from_millis(30)).await;
+            }
+        });
+        assert!(told.await.is_ok(), "{}: never {what}; {:?}\n{}", self.kind.key, self.now(), self.told);
+    }
+
+    async fn until_status(&mut self, what: &str, is_so: impl Fn(&Status) -> bool) -> Status {
+        let told = timeout(Duration::from_secs(30), async {
+            loop {
+                match self.look().await {
+                    Ok(status) if is_so(&status) => return status,
+                    _ => sleep(Duration::from_millis(30)).await,
+                }
+            }
+        });
+        told.await.unwrap_or_else(|_| panic!("{}: never {what}\n{}", self.kind.key, self.told))
+    }
+
+    async fn until_lost(&mut self) {
+        let told = timeout(Duration::from_secs(30), async { while self.look().await.is_ok() {} });
+        assert!(told.await.is_ok(), "{}: it answers", self.kind.key);
+    }
+
+    async fn until_answer(&mut self) {
+        self.until_status("an answer", |_| true).await;
+    }
+
+    async fn say(&mut self, line: &str) {
+        self.note("stranger", line);
+        self.stdin.write_all(format!("{line}\n").as_bytes()).await.expect("it listens");
+    }
+
+    fn note(&mut self, what: &str, came: &str) {
+        writeln!(self.told, "  {what}: {came}").expect("a text");
+    }
+
+    fn claim(&mut self, is_so: bool, otherwise: &str) {
+        if !is_so {
+            self.contradictions.push(format!("{otherwise}: {:?}", self.now()));
+        }
+    }
+
+    fn end(self) {
+        println!("{}:\n{}", self.kind.key, self.told);
+        assert!(
+            self.contradictions.is_empty(),
+            "{}:\n{}\n{}",
+            self.kind.key,
+            self.contradictions.join("\n"),
+            self.told
+        );
+    }
+}
+
+fn outcome<T>(result: &Result<T, Error>) -> String {
+    match result {
+        Ok(_) => "confirmed".to_owned(),
+        Err(error) => error.to_string(),
+    }
+}
