@@ -69,6 +69,7 @@ impl Rig {
         };
         let (end, ended) = watch::channel(false);
         let (sessions, failures, refused, pace, changes) = Default::default();
+        let (codes, page) = Default::default();
         let tokens = Some(Arc::new(Tokens::open(&folder.file("tokens")).unwrap()));
         let audit = Audit::open(&folder.file("audit")).unwrap();
         let gate = Arc::new(Gate {
@@ -76,6 +77,8 @@ impl Rig {
             tokens,
             audit,
             sessions,
+            codes,
+            page,
             failures,
             refused,
             pace,
