@@ -125,14 +125,20 @@ const fn unzigzag(number: u64) -> i64 {
     (number >> 1).cast_signed() ^ -((number & 1).cast_signed())
 }
 
-fn deflated(raw: &[u8]) -> Vec<u8> {
+/// Bytes as a zlib stream.
+#[must_use]
+pub fn deflated(raw: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
     // Into memory: it does not fail.
     let _ = encoder.write_all(raw);
     encoder.finish().unwrap_or_default()
 }
 
-fn inflated(packed: &[u8]) -> Result<Vec<u8>, Damaged> {
+/// The bytes of a zlib stream.
+///
+/// # Errors
+/// [`Damaged`]: it is none.
+pub fn inflated(packed: &[u8]) -> Result<Vec<u8>, Damaged> {
     let mut raw = Vec::new();
     ZlibDecoder::new(packed).take(LONGEST).read_to_end(&mut raw).map_err(|_| Damaged)?;
     Ok(raw)

@@ -5,7 +5,11 @@ use std::path::{Path, PathBuf};
 use drived_config::config::{Entry as _, settings, within};
 use drived_face::{ConfigError, Site, Source};
 
-use crate::{forecast::Forecast, write::Limits};
+use crate::{
+    forecast::Forecast,
+    forward::{Forward, Target},
+    write::Limits,
+};
 
 /// The file of the state folder.
 const FILE: &str = "history.sqlite";
@@ -17,6 +21,8 @@ pub struct HistoryConfig {
     pub file: Option<PathBuf>,
     pub limits: Limits,
     pub forecast: Forecast,
+    /// Where it is sent on to; `None`: it stays here.
+    pub forward: Option<Forward>,
 }
 
 /// What is said, while it is read.
@@ -29,6 +35,8 @@ pub struct Draft {
     minute_days: u32,
     years: u32,
     megabytes: u32,
+    forward: Option<Target>,
+    forward_token: Option<PathBuf>,
 }
 
 settings! {
@@ -47,11 +55,24 @@ settings! {
     years: u32 = "`10`", |to, said| to.years = within(*said, 1..=50, "")?;
     /// how large the file may become, in MiB, 16 to 1048576; what is finest goes first then
     size_mib: u32 = "`2048`", |to, said| to.megabytes = within(*said, 16..=1_048_576, "")?;
+    /// where every value is sent on to, as lines of Influx: `http://127.0.0.1:8428/write` for VictoriaMetrics, `http://127.0.0.1:8086/write?db=plant` or `…/api/v2/write?org=ORG&bucket=BUCKET` for InfluxDB; what could not be sent follows when that is back
+    forward: String = "nowhere", |to, said| to.forward = Some(said.parse().map_err(str::to_owned)?);
+    /// the file of the token that it wants; beside the configuration unless the path is whole
+    forward_token_file: PathBuf = "none", |to, said| to.forward_token = Some(said.clone());
 }
 
 impl Default for Draft {
     fn default() -> Self {
-        Self { is_on: true, file: None, polled_hours: 48, minute_days: 90, years: 10, megabytes: 2_048 }
+        Self {
+            is_on: true,
+            file: None,
+            polled_hours: 48,
+            minute_days: 90,
+            years: 10,
+            megabytes: 2_048,
+            forward: None,
+            forward_token: None,
+        }
     }
 }
 
@@ -73,10 +94,13 @@ impl HistoryConfig {
     }
 
     fn from(draft: Draft, beside: Option<&Path>, site: &Site<'_>) -> Self {
-        let Draft { is_on, file, polled_hours, minute_days, years, megabytes } = draft;
+        let Draft { is_on, file, polled_hours, minute_days, years, megabytes, forward, forward_token } =
+            draft;
         let said = file.map(|file| beside.unwrap_or(Path::new("")).join(file));
         let file = said.or_else(|| site.state.folder.as_ref().map(|folder| folder.join(FILE)));
         let limits = Limits::of(polled_hours, minute_days, years, megabytes);
-        Self { file: file.filter(|_| is_on), limits, forecast: Forecast::of(site, &limits) }
+        let token = forward_token.map(|file| beside.unwrap_or(Path::new("")).join(file));
+        let forward = forward.map(|target| Forward { target, token });
+        Self { file: file.filter(|_| is_on), limits, forecast: Forecast::of(site, &limits), forward }
     }
 }

@@ -7,11 +7,13 @@ use drived_face::{
     ConfigError, Configured, Face, Failure, Key, Meaning, Open, Opening, Plant, Site, Surroundings, Written,
     same,
 };
+use drived_plant::plant::views::NoticeView;
 use serde_json::{Map, Value, json};
-use tokio::sync::watch;
+use tokio::{sync::watch, task::JoinSet};
 
 use crate::{
     config::{HistoryConfig, HistoryEntry},
+    forward,
     listen::{Clocks, Listening},
     past::InFile,
     write::{
@@ -97,6 +99,8 @@ impl Configured for HistoryConfig {
                 format!("{} a day then, which wears an SD card", mebibytes(self.forecast.bytes_a_day)),
             ),
         ];
+        let sent = self.forward.as_ref().map(|forward| ("sent on", format!("to {}", forward.target)));
+        let rows = rows.into_iter().chain(sent).collect();
         vec![Meaning { head: format!("history: in {}", file.display()), rows }]
     }
 
@@ -106,6 +110,7 @@ impl Configured for HistoryConfig {
             "largest_bytes": self.limits.bytes,
             "forecast_bytes": self.forecast.bytes,
             "forecast_bytes_a_day": self.forecast.bytes_a_day,
+            "sent_on_to": self.forward.as_ref().map(|forward| forward.target.to_string()),
         });
         Map::from_iter([("history".to_owned(), object)])
     }
@@ -120,12 +125,25 @@ fn mebibytes(bytes: u64) -> String {
     format!("{} MiB", bytes.div_ceil(1 << 20))
 }
 
+/// Tells that nothing can be sent on, and when it can again: it is kept meanwhile, so that this is no alarm.
+async fn tell_forwarding(plant: Plant, mut failing: watch::Receiver<Option<String>>) {
+    while failing.changed().await.is_ok() {
+        let text = match &*failing.borrow_and_update() {
+            Some(why) => format!("the history cannot be sent on, and is kept until it can: {why}"),
+            None => "the history is sent on again".to_owned(),
+        };
+        tracing::warn!("{text}");
+        plant.tell_notice(NoticeView::new("history_forward", false, text));
+    }
+}
+
 /// The open black box.
 struct Recorder(Option<Recording>);
 
 struct Recording {
     plant: Plant,
     listening: Listening,
+    forwarding: Option<JoinSet<()>>,
     inbox: Inbox,
     writing: Option<JoinHandle<()>>,
 }
@@ -133,11 +151,19 @@ struct Recording {
 impl Recorder {
     fn open(config: HistoryConfig, around: &Surroundings) -> Self {
         let Some(path) = config.file else { return Self(None) };
-        around.plant.set_past(Some(Arc::new(InFile(path.clone()))));
         let (inbox, clocks) = (Inbox::default(), Clocks::begin());
+        let past = InFile { path: path.clone(), limits: config.limits, inbox: inbox.clone() };
+        around.plant.set_past(Some(Arc::new(past)));
         let (health, seen) = watch::channel(Health::Opening);
         let listening = Listening::start(&around.plant, &inbox, clocks, seen);
         let clock = move || clocks.now();
+        let forwarding = config.forward.map(|forward| {
+            let (failing, seen) = watch::channel(None);
+            let mut tasks = JoinSet::new();
+            tasks.spawn(forward::run(path.clone(), forward, inbox.clone(), failing));
+            tasks.spawn(tell_forwarding(around.plant.clone(), seen));
+            tasks
+        });
         let writer =
             Writer { path, limits: config.limits, inbox: inbox.clone(), clock, health: health.clone() };
         let writing = writer.start();
@@ -145,7 +171,7 @@ impl Recorder {
             health.send_replace(Health::Failing(error.to_string()));
         }
         let plant = around.plant.clone();
-        Self(Some(Recording { plant, listening, inbox, writing: writing.ok() }))
+        Self(Some(Recording { plant, listening, forwarding, inbox, writing: writing.ok() }))
     }
 }
 
@@ -155,9 +181,9 @@ impl Open for Recorder {
 
     fn close(self: Box<Self>) -> Pin<Box<dyn Future<Output = ()> + Send>> {
         Box::pin(async move {
-            let Some(Recording { plant, listening, inbox, writing }) = self.0 else { return };
+            let Some(Recording { plant, listening, forwarding, inbox, writing }) = self.0 else { return };
             plant.set_past(None);
-            drop(listening);
+            drop((listening, forwarding));
             inbox.end();
             let joined = tokio::task::spawn_blocking(move || writing.map(JoinHandle::join));
             let _ = tokio::time::timeout(ENDED_WITHIN, joined).await;

@@ -2,7 +2,7 @@
 //! waits for nobody.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     sync::Arc,
     time::{Duration, SystemTime},
 };
@@ -11,7 +11,7 @@ use drive_fleet::{DriveHandle, Snapshot};
 use drived_face::Plant;
 use drived_plant::plant::{
     revisions::Next,
-    views::{CommandView, NoticeView},
+    views::{CommandView, ExchangeView, NoticeView},
 };
 use serde::Deserialize;
 use tokio::{
@@ -21,10 +21,12 @@ use tokio::{
 };
 
 use crate::{
-    quantity::{Quantity, Set, of_measurements, of_status},
+    departure::Departure,
+    quantity::{Quantity, Set, numbers, of_measurements, of_status},
     record::{Kind, LineMinute, Moment, Record},
     tracker::Tracker,
     write::{
+        frames,
         inbox::{Inbox, Shown},
         writer::Health,
     },
@@ -35,6 +37,8 @@ const LOOK: Duration = Duration::from_secs(1);
 const MINUTE: Duration = Duration::from_secs(60);
 /// What is longer is kept without what the API told: a command for a thousand drives.
 const LONGEST_BODY: usize = 256 << 10;
+/// So many of the last exchanges of its line are kept beside a trip.
+const EXCHANGES: usize = 40;
 
 /// Both clocks of the daemon.
 #[derive(Debug, Clone, Copy)]
@@ -116,10 +120,23 @@ async fn drives(plant: Plant, inbox: Inbox, clocks: Clocks) {
 async fn follow(drive: DriveHandle, inbox: Inbox, clocks: Clocks) {
     let mut watch = drive.watch();
     let mut sets = Set::ALL.map(|set| (set, Tracker::default()));
+    let mut departure = Departure::default();
+    let numbers = numbers(drive.capabilities());
     loop {
         let snapshot = Arc::clone(&watch.borrow_and_update());
+        if let Some(left) = departure.look(&snapshot) {
+            let record = Record::of_history(clocks.now(), "output_departed", left.to_string());
+            let (name, line) = (drive.name().to_string(), drive.line().0.to_string());
+            inbox.record(Record {
+                kind: Kind::Event,
+                drive: Some(name),
+                line: Some(line),
+                body: serde_json::to_string(&left).ok(),
+                ..record
+            });
+        }
         for (set, tracker) in &mut sets {
-            let Some((at, max_age, values)) = read(*set, &snapshot) else { continue };
+            let Some((at, max_age, values)) = read(*set, &snapshot, &numbers) else { continue };
             if *set == Set::Status && snapshot.retracted {
                 // What it showed counts for nothing any more, and what comes next is no continuation of it.
                 tracker.break_off();
@@ -141,11 +158,11 @@ async fn follow(drive: DriveHandle, inbox: Inbox, clocks: Clocks) {
 type Reading = (Instant, Duration, Vec<(Quantity, i64)>);
 
 /// What is known of a set of a drive.
-fn read(set: Set, snapshot: &Snapshot) -> Option<Reading> {
+fn read(set: Set, snapshot: &Snapshot, numbers: &BTreeSet<u16>) -> Option<Reading> {
     match set {
         Set::Status => {
             let status = snapshot.status.as_ref()?;
-            Some((status.at, snapshot.max_age, of_status(&status.value, snapshot)))
+            Some((status.at, snapshot.max_age, of_status(&status.value, snapshot, numbers)))
         }
         Set::Measurements => {
             let measured = snapshot.measurements.as_ref()?;
@@ -166,10 +183,20 @@ async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
                     let told = frame.and_then(|frame| said(frame, clocks.now(), &mut alarms));
                     let Some(mut record) = told else { continue };
                     // Whoever asks what else happened on a line finds it by that.
-                    if let (None, Some(drive)) = (&record.line, &record.drive) {
-                        record.line = plant.fleet().drive(drive).map(|drive| drive.line().0.to_string());
+                    let drive = record.drive.as_ref().and_then(|drive| plant.fleet().drive(drive));
+                    if record.line.is_none() {
+                        record.line = drive.as_ref().map(|drive| drive.line().0.to_string());
                     }
+                    if frames::has_one(&record) {
+                        record.exchanges = record.line.as_ref().and_then(|line| exchanges(&plant, line));
+                    }
+                    let kept = drive.filter(|_| record.what == "trip_explained").and_then(|drive| {
+                        own_record(&drive.snapshot(), Record { body: None, ..record.clone() })
+                    });
                     inbox.record(record);
+                    if let Some(kept) = kept {
+                        inbox.record(kept);
+                    }
                 }
             }
             // A reload, or too much at once: whether something is missing nobody knows.
@@ -181,6 +208,24 @@ async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
             Next::End => return,
         }
     }
+}
+
+/// What a line said last, as JSON.
+fn exchanges(plant: &Plant, line: &str) -> Option<String> {
+    let (_, line) = plant.fleet().lines().into_iter().find(|(name, _)| **name == *line)?;
+    let all = line.exchanges();
+    let last: Vec<ExchangeView> =
+        all[all.len().saturating_sub(EXCHANGES)..].iter().map(ExchangeView::of).collect();
+    if last.is_empty() { None } else { serde_json::to_string(&last).ok() }
+}
+
+/// The drive's own record of its faults, which was read together with what it tripped by.
+fn own_record(snapshot: &Snapshot, of_trip: Record) -> Option<Record> {
+    let faults = snapshot.trips.back()?.faults.clone().filter(|faults| !faults.history.is_empty())?;
+    let kept: Vec<String> = faults.history.iter().map(ToString::to_string).collect();
+    let text = format!("its own record of faults, in its own order: {}", kept.join("; "));
+    let body = serde_json::to_string(&*faults).ok();
+    Some(Record { what: "fault_record".to_owned(), is_alarm: false, text, body, ..of_trip })
 }
 
 /// An event as the stream tells it, as far as it is looked at here.
@@ -293,6 +338,9 @@ async fn lines(plant: Plant, inbox: Inbox, clocks: Clocks) {
                 answered: sum(|slave| slave.outcomes.answered),
                 damaged: sum(|slave| slave.outcomes.damaged + slave.outcomes.mismatches),
                 missing: sum(|slave| slave.outcomes.timeouts),
+                foreign: stats.foreign,
+                silences: stats.silence.count(),
+                silence: stats.silence.mean() * u32::try_from(stats.silence.count()).unwrap_or(u32::MAX),
                 elapsed: stats.elapsed,
                 busy: stats.busy,
             };
@@ -301,6 +349,8 @@ async fn lines(plant: Plant, inbox: Inbox, clocks: Clocks) {
             let last = last.filter(|last| last.elapsed <= counted.elapsed).unwrap_or_default();
             let elapsed = counted.elapsed.saturating_sub(last.elapsed).as_millis().max(1);
             let busy = counted.busy.saturating_sub(last.busy).as_millis() * 1_000 / elapsed;
+            let silences = counted.silences.saturating_sub(last.silences);
+            let silence = counted.silence.saturating_sub(last.silence);
             inbox.line(LineMinute {
                 wall_ms: clocks.now().wall_ms,
                 line: name,
@@ -308,6 +358,9 @@ async fn lines(plant: Plant, inbox: Inbox, clocks: Clocks) {
                 answered: counted.answered.saturating_sub(last.answered),
                 damaged: counted.damaged.saturating_sub(last.damaged),
                 missing: counted.missing.saturating_sub(last.missing),
+                foreign: counted.foreign.saturating_sub(last.foreign),
+                silences,
+                silence_us: u64::try_from(silence.as_micros()).ok().and_then(|sum| sum.checked_div(silences)),
                 busy_permille: u64::try_from(busy.min(1_000)).unwrap_or(1_000),
                 is_open: stats.opened > stats.lost,
             });
@@ -321,6 +374,9 @@ struct Counted {
     answered: u64,
     damaged: u64,
     missing: u64,
+    foreign: u64,
+    silences: u64,
+    silence: Duration,
     elapsed: Duration,
     busy: Duration,
 }

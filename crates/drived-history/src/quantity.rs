@@ -1,8 +1,11 @@
 //! What is kept of a drive as numbers: [`Quantity`], one row each, with its unit, its steps, and what is no change yet.
 
-use std::fmt;
+use std::{collections::BTreeSet, fmt};
 
-use drive_core::{Control, Frequency, Measurements, Motion, Setpoint, State, Status};
+use drive_core::{
+    Capabilities, Control, Frequency, Measurements, Motion, Setpoint, State, Status,
+    registers::{Form, Unit},
+};
 use drive_fleet::Snapshot;
 use drived_plant::plant::past::{IsView, PointView};
 
@@ -34,6 +37,8 @@ pub struct Quantity(pub u32);
 
 /// The first number of a word; the word's address is added to it.
 const WORDS: u32 = 0x1_0000;
+/// Likewise of a word that is a number by the manual, such as a measured current: it moves all the time.
+const NUMBERS: u32 = 0x2_0000;
 
 /// How a quantity is counted.
 #[derive(Debug, Clone, Copy)]
@@ -146,15 +151,38 @@ impl Quantity {
     pub const OUTPUT_FREQUENCY: Self = Self(1);
     pub const SETPOINT: Self = Self(2);
     pub const CURRENT: Self = Self(3);
+    pub const WARNING: Self = Self(8);
     pub const FAULT_CODE: Self = Self(9);
     pub const DC_BUS_VOLTAGE: Self = Self(14);
     pub const TORQUE: Self = Self(16);
+    pub const INPUT_POWER: Self = Self(18);
+    pub const OUTPUT_POWER: Self = Self(19);
+    pub const DRIVE_THERMAL: Self = Self(20);
     pub const MOTOR_THERMAL: Self = Self(21);
+    pub const INPUT_ENERGY: Self = Self(24);
+    pub const OUTPUT_ENERGY: Self = Self(25);
+    pub const RUNNING_TIME: Self = Self(26);
+    pub const INPUTS: Self = Self(28);
+
+    /// The count of the state in which a motor runs.
+    pub const RUNNING: i64 = state(State::Running);
 
     /// The word at an address.
     #[must_use]
     pub const fn word(address: u16) -> Self {
         Self(WORDS + address as u32)
+    }
+
+    /// The word at an address that is a number by the manual.
+    #[must_use]
+    pub const fn number(address: u16) -> Self {
+        Self(NUMBERS + address as u32)
+    }
+
+    /// Whether it is kept at each of its changes for as long as the records are: state, words of bits, inputs.
+    #[must_use]
+    pub fn is_kept_by_changes(self) -> bool {
+        !self.is_number() && self.0 < NUMBERS
     }
 
     /// How it is counted; `None`: it is a word.
@@ -168,6 +196,9 @@ impl Quantity {
     pub fn named(name: &str) -> Option<Self> {
         if let Some(address) = name.strip_prefix("word_") {
             return address.parse().ok().map(Self::word);
+        }
+        if let Some(address) = name.strip_prefix("number_") {
+            return address.parse().ok().map(Self::number);
         }
         let place = TABLE.iter().position(|row| row.name == name)?;
         u32::try_from(place).ok().map(Self)
@@ -230,14 +261,25 @@ impl fmt::Display for Quantity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.row() {
             Some(row) => f.pad(row.name),
+            None if self.0 >= NUMBERS => write!(f, "number_{}", self.0 - NUMBERS),
             None => write!(f, "word_{}", self.0.saturating_sub(WORDS)),
         }
     }
 }
 
-/// What a status shows, with the setpoint that the fleet knows beside it.
+/// The addresses of a family's registers that are numbers.
 #[must_use]
-pub fn of_status(status: &Status, snapshot: &Snapshot) -> Vec<(Quantity, i64)> {
+pub fn numbers(capabilities: &Capabilities) -> BTreeSet<u16> {
+    let is_number = |row: &&drive_core::Row| {
+        row.unit.form == Form::Number && row.unit != Unit::COUNT && row.range.choices().is_empty()
+    };
+    capabilities.rows.iter().filter(is_number).map(|row| row.address).collect()
+}
+
+/// What a status shows, with the setpoint that the fleet knows beside it; `numbers` says which of its words
+/// are numbers.
+#[must_use]
+pub fn of_status(status: &Status, snapshot: &Snapshot, numbers: &BTreeSet<u16>) -> Vec<(Quantity, i64)> {
     let hertz = |frequency: Frequency| i64::from(frequency.centihertz());
     let setpoint = match snapshot.setpoint {
         Some(Setpoint::Frequency(frequency)) => Some(hertz(frequency)),
@@ -255,7 +297,10 @@ pub fn of_status(status: &Status, snapshot: &Snapshot) -> Vec<(Quantity, i64)> {
         status.warning.map(i64::from),
         status.fault_code.map(i64::from),
     ];
-    let words = status.raw.iter().map(|word| (Quantity::word(word.address), i64::from(word.value)));
+    let words = status.raw.iter().map(|word| match numbers.contains(&word.address) {
+        true => (Quantity::number(word.address), i64::from(word.value)),
+        false => (Quantity::word(word.address), i64::from(word.value)),
+    });
     numbered(0, known).chain(words).collect()
 }
 
@@ -322,6 +367,10 @@ mod tests {
             assert_eq!(Quantity::named(&quantity.to_string()), Some(quantity));
         }
         assert_eq!(Quantity::named("word_3201"), Some(Quantity::word(3_201)));
+        assert_eq!(Quantity::named("number_8604"), Some(Quantity::number(8_604)));
+        assert_eq!(Quantity::number(8_604).to_string(), "number_8604");
+        assert!(Quantity::STATE.is_kept_by_changes() && Quantity::word(3_201).is_kept_by_changes());
+        assert!(!Quantity::number(8_604).is_kept_by_changes() && !Quantity::CURRENT.is_kept_by_changes());
         assert_eq!(Quantity::named("speed"), None);
         for (quantity, name) in [
             (Quantity::STATE, "state"),
@@ -332,6 +381,14 @@ mod tests {
             (Quantity::DC_BUS_VOLTAGE, "dc_bus_voltage_v"),
             (Quantity::TORQUE, "torque_percent"),
             (Quantity::MOTOR_THERMAL, "motor_thermal_percent"),
+            (Quantity::WARNING, "warning"),
+            (Quantity::INPUT_POWER, "input_power_kw"),
+            (Quantity::OUTPUT_POWER, "output_power_kw"),
+            (Quantity::DRIVE_THERMAL, "drive_thermal_percent"),
+            (Quantity::INPUT_ENERGY, "input_energy_counts"),
+            (Quantity::OUTPUT_ENERGY, "output_energy_counts"),
+            (Quantity::RUNNING_TIME, "running_time_h"),
+            (Quantity::INPUTS, "inputs"),
         ] {
             assert_eq!(quantity.to_string(), name);
         }

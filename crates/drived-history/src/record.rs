@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use drived_plant::plant::past::ParameterRead;
+
 /// When something happened, by both clocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Moment {
@@ -56,6 +58,8 @@ pub struct Record {
     pub body: Option<String>,
     /// Of what is told again as it becomes known, such as a command: by which it is the same.
     pub act: Option<String>,
+    /// Of what has a freeze-frame: what its line had said until then, as JSON.
+    pub exchanges: Option<String>,
 }
 
 impl Record {
@@ -72,6 +76,7 @@ impl Record {
             text: text.into(),
             body: None,
             act: None,
+            exchanges: None,
         }
     }
 }
@@ -86,7 +91,20 @@ pub struct LineMinute {
     pub answered: u64,
     pub damaged: u64,
     pub missing: u64,
+    /// Whole frames of somebody else.
+    pub foreign: u64,
+    /// Silences that were kept before requests, and their mean.
+    pub silences: u64,
+    pub silence_us: Option<u64>,
     /// Thousandths of the minute in which it was needed.
     pub busy_permille: u64,
     pub is_open: bool,
+}
+
+/// A setting of a drive that was read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Setting {
+    /// When, by the wall's clock.
+    pub wall_ms: i64,
+    pub read: ParameterRead,
 }

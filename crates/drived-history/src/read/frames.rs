@@ -2,7 +2,12 @@
 
 use rusqlite::{Connection, params};
 
-use crate::{column::unpack, curve::Piece, quantity::Quantity, store::StoreError};
+use crate::{
+    column::{Damaged, inflated, unpack},
+    curve::Piece,
+    quantity::Quantity,
+    store::StoreError,
+};
 
 /// What was known of a drive around something that happened to it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -12,7 +17,11 @@ pub struct Frame {
     pub at_unix_ms: i64,
     /// Whether what came after it is in it too.
     pub is_whole: bool,
+    pub start_ms: i64,
+    pub end_ms: i64,
     pub curves: Vec<(Quantity, Piece)>,
+    /// What its line had said until then, as JSON; empty where that was not kept.
+    pub exchanges: String,
 }
 
 /// The frames of a drive between two moments.
@@ -21,16 +30,26 @@ pub struct Frame {
 /// It cannot be read.
 pub fn frames(connection: &Connection, drive: &str, from: i64, to: i64) -> Result<Vec<Frame>, StoreError> {
     let mut find = connection.prepare_cached(
-        "SELECT id, why, at_ms, is_whole FROM frame WHERE drive = ?1 AND at_ms BETWEEN ?2 AND ?3 ORDER BY id LIMIT 100",
+        "SELECT id, why, at_ms, is_whole, start_ms, end_ms, exchanges FROM frame WHERE drive = ?1 AND at_ms BETWEEN ?2 AND ?3 ORDER BY id LIMIT 100",
     )?;
     let rows = find.query_map(params![drive, from, to], |row| {
-        let frame =
-            Frame { why: row.get(1)?, at_unix_ms: row.get(2)?, is_whole: row.get(3)?, curves: Vec::new() };
-        Ok((row.get::<_, i64>(0)?, frame))
+        let frame = Frame {
+            why: row.get(1)?,
+            at_unix_ms: row.get(2)?,
+            is_whole: row.get(3)?,
+            start_ms: row.get(4)?,
+            end_ms: row.get(5)?,
+            curves: Vec::new(),
+            exchanges: String::new(),
+        };
+        Ok((row.get::<_, i64>(0)?, frame, row.get::<_, Option<Vec<u8>>>(6)?))
     })?;
     let mut all = Vec::new();
     for row in rows {
-        let (id, mut frame) = row?;
+        let (id, mut frame, exchanges) = row?;
+        if let Some(exchanges) = exchanges {
+            frame.exchanges = String::from_utf8(inflated(&exchanges)?).map_err(|_| Damaged)?;
+        }
         let mut find = connection.prepare_cached(
             "SELECT quantity, start_ms, end_ms, data FROM frame_block WHERE frame = ?1 ORDER BY quantity, start_ms",
         )?;

@@ -3,18 +3,26 @@
 //! Moments are milliseconds since 1970 by the wall's clock as it stood then. Where that clock was set back, what was told twice of one time is
 //! given in the order of the daemon's own clock.
 
+mod days;
 mod frames;
+mod lines;
+mod parameters;
 mod records;
 mod steps;
+mod then;
 
 use std::{collections::BTreeSet, path::Path};
 
 use rusqlite::{Connection, OptionalExtension as _, params};
 
 pub use self::{
+    days::days,
     frames::{Frame, frames},
+    lines::{line_minutes, lines_at},
+    parameters::parameters,
     records::{Filter, Found, records},
-    steps::{pack_minutes, steps},
+    steps::{pack_steps, steps},
+    then::then,
 };
 use crate::{
     chunk::{Chunk, piece_of},
@@ -53,6 +61,21 @@ pub fn drives(connection: &Connection) -> Result<Vec<String>, StoreError> {
     Ok(rows.collect::<Result<_, _>>()?)
 }
 
+/// When the history begins, and the newest moment of which it knows something; nothing where nothing is there.
+///
+/// # Errors
+/// It cannot be read.
+pub fn bounds(connection: &Connection) -> Result<(Option<i64>, Option<i64>), StoreError> {
+    let row = |row: &rusqlite::Row<'_>| Ok((row.get(0)?, row.get(1)?));
+    Ok(connection.query_row(
+        "SELECT (SELECT min(wall_ms) FROM record),
+                (SELECT max(at) FROM (SELECT max(wall_ms) AS at FROM record UNION ALL SELECT max(end_ms) FROM flush
+                    UNION ALL SELECT end_ms FROM block WHERE id = (SELECT max(id) FROM block)))",
+        [],
+        row,
+    )?)
+}
+
 /// The quantities of a drive that are kept as they were read between two moments.
 ///
 /// # Errors
@@ -85,7 +108,11 @@ pub fn quantities(
 /// # Errors
 /// It cannot be read.
 pub fn all_quantities(connection: &Connection, drive: &str) -> Result<Vec<Quantity>, StoreError> {
-    let mut all = quantities(connection, drive, i64::MIN, i64::MAX)?;
+    // What was read within the last day says what is there; older than that, the steps do.
+    let newest: Option<i64> =
+        connection.prepare_cached("SELECT max(end_ms) FROM flush")?.query_row([], |row| row.get(0))?;
+    let newest = newest.unwrap_or(i64::MAX);
+    let mut all = quantities(connection, drive, newest.saturating_sub(LONGEST_BLOCK_MS), newest)?;
     let mut find = connection.prepare_cached(
         "SELECT id FROM quantity AS one WHERE EXISTS
             (SELECT 1 FROM source JOIN hour ON hour.source = source.id AND hour.quantity = one.id WHERE drive = ?1)",
@@ -93,6 +120,15 @@ pub fn all_quantities(connection: &Connection, drive: &str) -> Result<Vec<Quanti
     let rows = find.query_map([drive], |row| row.get(0).map(Quantity))?;
     for quantity in rows {
         all.insert(quantity?);
+    }
+    for source in Set::ALL.into_iter().filter_map(|set| source(connection, drive, set).transpose()) {
+        let (source, mut last) = (source?, -1_i64);
+        let mut next = connection
+            .prepare_cached("SELECT min(quantity) FROM change WHERE source = ?1 AND quantity > ?2")?;
+        while let Some(found) = next.query_row([source, last], |row| row.get::<_, Option<i64>>(0))? {
+            all.extend(u32::try_from(found).map(Quantity));
+            last = found;
+        }
     }
     Ok(all.into_iter().collect())
 }
@@ -108,6 +144,21 @@ pub fn pieces(
     from: i64,
     to: i64,
 ) -> Result<Vec<Piece>, StoreError> {
+    let told = told_in(connection, drive, quantity, from, to)?;
+    Ok(told.into_iter().map(|(_, piece)| piece).collect())
+}
+
+/// The same, each with the number of its segment: the time in which the clock was not set.
+///
+/// # Errors
+/// It cannot be read.
+pub fn told_in(
+    connection: &Connection,
+    drive: &str,
+    quantity: Quantity,
+    from: i64,
+    to: i64,
+) -> Result<Vec<(i64, Piece)>, StoreError> {
     let mut all: Vec<(i64, Piece)> = Vec::new();
     for source in Set::ALL.into_iter().filter_map(|set| source(connection, drive, set).transpose()) {
         let source = source?;
@@ -127,16 +178,77 @@ pub fn pieces(
         for (segment, start, end, data) in chunks(connection, source, from, to)? {
             all.push((segment, piece_of(quantity, start, end, &data)?));
         }
+        if quantity.is_kept_by_changes() {
+            let until = oldest_block(connection, source, quantity)?.unwrap_or(i64::MAX);
+            all.extend(changes(connection, source, quantity, from, to.min(until))?);
+        }
     }
     // A quantity is of one source; what is in blocks is older than what is in chunks, within each segment.
     all.sort_by_key(|(segment, piece)| (*segment, piece.start));
     let mut pieces = Vec::new();
     for of_one in all.chunk_by(|(one, _), (other, _)| one == other) {
         let whole = joined(of_one.iter().map(|(_, piece)| piece.clone()));
-        pieces
-            .extend(whole.and_then(|whole| whole.between(from, to)).filter(|piece| !piece.points.is_empty()));
+        let part = whole.and_then(|whole| whole.between(from, to)).filter(|piece| !piece.points.is_empty());
+        pieces.extend(of_one.first().map(|(segment, _)| *segment).zip(part));
     }
     Ok(pieces)
+}
+
+/// From when on a quantity is kept as it was read.
+fn oldest_kept(connection: &Connection, drive: &str, quantity: Quantity) -> Result<Option<i64>, StoreError> {
+    let mut oldest: Option<i64> =
+        connection.prepare_cached("SELECT min(start_ms) FROM flush")?.query_row([], |row| row.get(0))?;
+    for source in Set::ALL.into_iter().filter_map(|set| source(connection, drive, set).transpose()) {
+        oldest = oldest.into_iter().chain(oldest_block(connection, source?, quantity)?).min();
+    }
+    Ok(oldest)
+}
+
+/// When the oldest block of a quantity begins.
+fn oldest_block(connection: &Connection, source: i64, quantity: Quantity) -> Result<Option<i64>, StoreError> {
+    let mut find =
+        connection.prepare_cached("SELECT min(start_ms) FROM block WHERE source = ?1 AND quantity = ?2")?;
+    Ok(find.query_row(params![source, quantity.0], |row| row.get(0))?)
+}
+
+/// What is known of a word from its changes, where no block is kept any more: one piece for each time the clock was not set in.
+fn changes(
+    connection: &Connection,
+    source: i64,
+    quantity: Quantity,
+    from: i64,
+    to: i64,
+) -> Result<Vec<(i64, Piece)>, StoreError> {
+    if from > to {
+        return Ok(Vec::new());
+    }
+    let mut find = connection.prepare_cached(
+        "SELECT segment, at_ms, count FROM change WHERE source = ?1 AND quantity = ?2 AND at_ms <= ?4 AND at_ms >=
+            coalesce((SELECT max(at_ms) FROM change WHERE source = ?1 AND quantity = ?2 AND at_ms <= ?3), ?3)
+         ORDER BY at_ms",
+    )?;
+    let rows = find.query_map(params![source, quantity.0, from, to], |row| {
+        Ok((row.get::<_, i64>(0)?, Point { at: row.get(1)?, count: row.get(2)? }))
+    })?;
+    let mut all: std::collections::BTreeMap<i64, Piece> = std::collections::BTreeMap::new();
+    for row in rows {
+        let (segment, point) = row?;
+        let piece = all.entry(segment).or_insert_with(|| Piece {
+            start: point.at,
+            end: point.at,
+            points: Vec::new(),
+        });
+        piece.end = if point.count.is_none() { point.at - 1 } else { to.max(point.at) };
+        piece.points.push(point);
+    }
+    let ended = |piece: Piece| {
+        let mut points = piece.points;
+        if points.last().is_some_and(|last| last.count.is_none()) {
+            points.pop();
+        }
+        Piece { points, ..piece }
+    };
+    Ok(all.into_iter().map(|(segment, piece)| (segment, ended(piece))).collect())
 }
 
 /// The same as points, each in its turn: what is read of a long time is never in memory at once. It ends when `each` says `false`.
@@ -195,20 +307,29 @@ fn kept(
         let mut find = connection.prepare_cached(
             "SELECT min(start_ms), max(start_ms) FROM block WHERE source = ?1 AND quantity = ?2",
         )?;
+        let source = source?;
         let (oldest, newest): (Option<i64>, Option<i64>) =
-            find.query_row(params![source?, quantity.0], |row| Ok((row.get(0)?, row.get(1)?)))?;
-        first = [first, oldest].into_iter().flatten().min();
+            find.query_row(params![source, quantity.0], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        let mut find =
+            connection.prepare_cached("SELECT min(at_ms) FROM change WHERE source = ?1 AND quantity = ?2")?;
+        let changed: Option<i64> = find.query_row(params![source, quantity.0], |row| row.get(0))?;
+        let mut find =
+            connection.prepare_cached("SELECT max(at_ms) FROM change WHERE source = ?1 AND quantity = ?2")?;
+        let last_changed: Option<i64> = find.query_row(params![source, quantity.0], |row| row.get(0))?;
+        last = [last, last_changed].into_iter().flatten().max();
+        first = [first, oldest, changed].into_iter().flatten().min();
         last = [last, newest.map(|start| start.saturating_add(LONGEST_BLOCK_MS))].into_iter().flatten().max();
     }
     Ok((from.max(first.unwrap_or(i64::MAX)), to.min(last.unwrap_or(i64::MIN))))
 }
 
-/// A time in parts of six hours, each of which begins where the one before ends.
+/// A time in parts of six hours, or of a week where it is longer than a year, each of which begins where the one before ends.
 fn windows(from: i64, to: i64) -> impl Iterator<Item = (i64, i64)> {
-    const WINDOW_MS: i64 = 6 * 3_600_000;
-    let first = (from <= to).then_some((from, from.saturating_add(WINDOW_MS).min(to)));
+    const HOUR_MS: i64 = 3_600_000;
+    let window = if to.saturating_sub(from) > 366 * 24 * HOUR_MS { 168 * HOUR_MS } else { 6 * HOUR_MS };
+    let first = (from <= to).then_some((from, from.saturating_add(window).min(to)));
     std::iter::successors(first, move |(_, end)| {
-        (*end < to).then(|| (*end, end.saturating_add(WINDOW_MS).min(to)))
+        (*end < to).then(|| (*end, end.saturating_add(window).min(to)))
     })
 }
 

@@ -16,7 +16,8 @@ const MINUTE_MS: i64 = 60_000;
 const HOUR_MS: i64 = 3_600_000;
 
 /// The steps of a quantity between two moments; a step of which nothing is known is not there. From a minute on they are summed up from
-/// what was kept in minutes, or, where that is not kept any more, in hours: those stand at the beginning of their hour.
+/// what was kept in minutes, or, where that is not kept any more, in hours: those stand at the beginning of their hour. It ends when `go_on`
+/// says `false`.
 ///
 /// # Errors
 /// It cannot be read.
@@ -27,6 +28,7 @@ pub fn steps(
     from: i64,
     to: i64,
     length_ms: i64,
+    go_on: &dyn Fn() -> bool,
 ) -> Result<Vec<StepView>, StoreError> {
     let length_ms = length_ms.max(1);
     let from = from - from.rem_euclid(length_ms);
@@ -34,6 +36,9 @@ pub fn steps(
     if length_ms % MINUTE_MS != 0 || !quantity.is_number() {
         let (first, last) = kept(connection, drive, quantity, from, to)?;
         for (start, end) in windows(first, last) {
+            if !go_on() {
+                break;
+            }
             pieces(connection, drive, quantity, start, end)?.into_iter().for_each(|piece| steps.add(piece));
         }
     } else {
@@ -102,6 +107,21 @@ fn add_hours(
         let (start, step) = row?;
         steps.add_step(start, step);
     }
+    let mut find = connection.prepare_cached(
+        "SELECT start_ms, data FROM hours WHERE source = ?1 AND quantity = ?2 AND start_ms <= ?4 AND start_ms >=
+            coalesce((SELECT max(start_ms) FROM hours WHERE source = ?1 AND quantity = ?2 AND start_ms <= ?3), ?3)",
+    )?;
+    let rows = find.query_map(params![source, quantity.0, from, to], |row| {
+        Ok((row.get::<_, i64>(0)?, row.get::<_, Vec<u8>>(1)?))
+    })?;
+    for row in rows {
+        let (start, data) = row?;
+        for (at, step) in unpack_steps(HOUR_MS, start, &data)? {
+            if (from..=to).contains(&at) {
+                steps.add_step(at, step);
+            }
+        }
+    }
     Ok(())
 }
 
@@ -122,7 +142,7 @@ fn add_minutes(
     })?;
     for row in rows {
         let (start, data) = row?;
-        for (at, step) in unpack_minutes(start, &data)? {
+        for (at, step) in unpack_steps(MINUTE_MS, start, &data)? {
             if (from..=to).contains(&at) {
                 steps.add_step(at, step);
             }
@@ -131,13 +151,13 @@ fn add_minutes(
     Ok(())
 }
 
-/// Minutes as bytes, from the first on: all beginnings, then all least, and so on, each by its difference.
+/// Minutes, or hours, as bytes, from the first on: all beginnings, then all least, and so on, each by its difference.
 #[must_use]
-pub fn pack_minutes(start: i64, minutes: &[(i64, Step)]) -> Vec<u8> {
+pub fn pack_steps(length_ms: i64, start: i64, minutes: &[(i64, Step)]) -> Vec<u8> {
     let mut numbers = Vec::with_capacity(minutes.len() * 5);
     let mut before = start;
     for (at, _) in minutes {
-        numbers.push((at - before) / MINUTE_MS);
+        numbers.push((at - before) / length_ms);
         before = *at;
     }
     let mut before = 0;
@@ -148,24 +168,24 @@ pub fn pack_minutes(start: i64, minutes: &[(i64, Step)]) -> Vec<u8> {
     // Within a step of a count.
     numbers.extend(minutes.iter().map(|(_, step)| (step.mean.round() as i64).wrapping_sub(step.least)));
     numbers.extend(minutes.iter().map(|(_, step)| step.greatest.wrapping_sub(step.least)));
-    numbers.extend(minutes.iter().map(|(_, step)| MINUTE_MS - step.known_ms));
+    numbers.extend(minutes.iter().map(|(_, step)| length_ms - step.known_ms));
     pack_numbers(&numbers)
 }
 
-fn unpack_minutes(start: i64, data: &[u8]) -> Result<Vec<(i64, Step)>, StoreError> {
+fn unpack_steps(length_ms: i64, start: i64, data: &[u8]) -> Result<Vec<(i64, Step)>, StoreError> {
     let numbers = unpack_numbers(data)?;
     let count = numbers.len() / 5;
     let (mut at, mut least) = (start, 0_i64);
     let row = |part: usize, place: usize| numbers.get(part * count + place).copied().unwrap_or_default();
     Ok((0..count)
         .map(|place| {
-            at = at.wrapping_add(row(0, place).wrapping_mul(MINUTE_MS));
+            at = at.wrapping_add(row(0, place).wrapping_mul(length_ms));
             least = least.wrapping_add(row(1, place));
             let step = Step {
                 least,
                 mean: least.wrapping_add(row(2, place)) as f64,
                 greatest: least.wrapping_add(row(3, place)),
-                known_ms: MINUTE_MS.wrapping_sub(row(4, place)),
+                known_ms: length_ms.wrapping_sub(row(4, place)),
             };
             (at, step)
         })

@@ -8,9 +8,9 @@ use crate::quantity::TABLE;
 pub const APPLICATION: i32 = 0x6472_7664;
 
 /// One step for each version: the tables of the first, and what each later one changed.
-const STEPS: &[&str] = &[FIRST];
+const STEPS: &[&str] = &[FIRST, SECOND];
 
-const FIRST: &str = "
+pub(crate) const FIRST: &str = "
 CREATE TABLE run (
     id INTEGER PRIMARY KEY,
     began_ms INTEGER NOT NULL,
@@ -120,6 +120,58 @@ CREATE TABLE line_minute (
     is_open INTEGER NOT NULL,
     PRIMARY KEY (wall_ms, line)
 ) WITHOUT ROWID;
+";
+
+/// Age by the daemon's own clock, words for years, hours in packs, settings, and what the line said around a trip.
+const SECOND: &str = "
+ALTER TABLE run ADD COLUMN lived_ms INTEGER NOT NULL DEFAULT 0;
+CREATE TABLE mark (
+    id INTEGER PRIMARY KEY,
+    lived_ms INTEGER NOT NULL,
+    wall_ms INTEGER NOT NULL,
+    block INTEGER NOT NULL,
+    minute INTEGER NOT NULL,
+    record INTEGER NOT NULL,
+    frame INTEGER NOT NULL
+);
+CREATE TABLE change (
+    source INTEGER NOT NULL,
+    quantity INTEGER NOT NULL,
+    at_ms INTEGER NOT NULL,
+    segment INTEGER NOT NULL,
+    count INTEGER,
+    PRIMARY KEY (source, quantity, at_ms)
+) WITHOUT ROWID;
+CREATE TABLE hours (
+    source INTEGER NOT NULL,
+    quantity INTEGER NOT NULL,
+    start_ms INTEGER NOT NULL,
+    data BLOB NOT NULL,
+    PRIMARY KEY (source, quantity, start_ms)
+) WITHOUT ROWID;
+CREATE TABLE parameter (
+    id INTEGER PRIMARY KEY,
+    drive TEXT NOT NULL,
+    address INTEGER NOT NULL,
+    code TEXT NOT NULL,
+    word INTEGER NOT NULL,
+    text TEXT NOT NULL,
+    first_ms INTEGER NOT NULL,
+    last_ms INTEGER NOT NULL,
+    times INTEGER NOT NULL
+);
+CREATE INDEX parameter_of ON parameter (drive, address);
+CREATE TABLE sent (
+    target TEXT PRIMARY KEY,
+    segment INTEGER NOT NULL,
+    until_ms INTEGER NOT NULL
+);
+ALTER TABLE frame ADD COLUMN run INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE frame ADD COLUMN steady_ms INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE frame ADD COLUMN exchanges BLOB;
+ALTER TABLE line_minute ADD COLUMN foreigners INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE line_minute ADD COLUMN silences INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE line_minute ADD COLUMN silence_us INTEGER;
 ";
 
 /// The version that is written here.

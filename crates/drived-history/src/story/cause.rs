@@ -13,6 +13,8 @@ const TOGETHER_MS: i64 = 5_000;
 const OBEYED_MS: i64 = 10_000;
 /// A silence may be the cause of a trip of the watchdog within this time.
 const SILENT_MS: i64 = 90_000;
+/// The slow set is read so rarely that what it shows belongs to something within this time.
+const BESIDE_MS: i64 = 60_000;
 
 /// Why this happened, the surest first. It is never empty.
 pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
@@ -20,15 +22,20 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         "tripped" => of_trip(facts, about),
         "lost" => of_loss(facts, about),
         "state_changed" => of_change(facts, about),
-        "control_taken" => vec![
-            Sentence::of(Said, format!("the drive says so: {}", about.text)),
-            Sentence::of(NotKnown, "who it was cannot be seen from the line"),
-        ],
-        "output_blocked" | "reference_taken" | "command_overridden" => vec![
-            Sentence::of(Said, format!("the drive's own words show it: {}", about.text)),
-            Sentence::of(NotKnown, "who or what did it at the drive cannot be seen from the line"),
-        ],
+        "control_taken" => at_the_drive(
+            facts,
+            about,
+            format!("the drive says so: {}", about.text),
+            "who it was cannot be seen from the line",
+        ),
+        "output_blocked" | "reference_taken" | "command_overridden" => at_the_drive(
+            facts,
+            about,
+            format!("the drive's own words show it: {}", about.text),
+            "who or what did it at the drive cannot be seen from the line",
+        ),
         "stop_unconfirmed" => of_unconfirmed_stop(facts, about),
+        "output_departed" => of_departure(facts, about),
         _ if about.kind == "command" => {
             vec![Sentence::of(Seen, format!("it was asked for here: {}", about.text))]
         }
@@ -36,6 +43,81 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     };
     said.extend(program(facts, about.time_unix_ms));
     said
+}
+
+/// What somebody or something did at the drive itself.
+fn at_the_drive(facts: &Facts, about: &RecordView, said: String, open: &str) -> Vec<Sentence> {
+    let mut all = vec![Sentence::of(Said, said)];
+    all.extend(seen_beside(facts, about.time_unix_ms));
+    all.push(Sentence::of(NotKnown, open));
+    all
+}
+
+/// What was seen at the drive and on its line beside something that nobody here asked for: inputs, and frames of others.
+fn seen_beside(facts: &Facts, at: i64) -> Vec<Sentence> {
+    let mut said = Vec::new();
+    for pair in facts.inputs.windows(2) {
+        let ((_, before), (seen, now)) = (pair[0], pair[1]);
+        if before != now && (at - BESIDE_MS..=at + BESIDE_MS).contains(&seen) {
+            let text = format!(
+                "its inputs changed from {before:04X}h to {now:04X}h, seen when they were read next ({})",
+                bits(before, now)
+            );
+            said.push(Sentence::of(Seen, text).at(seen));
+            let text = "an input of the drive may have done it: what each does is in the drive's settings";
+            said.push(Sentence::of(Likely, text));
+            break;
+        }
+    }
+    let heard = facts.foreigners.iter().find(|(ended, _)| (at..=at + BESIDE_MS).contains(ended));
+    if let Some((ended, frames)) = heard {
+        let text = format!("its line heard {frames} frames of somebody else in the minute until then");
+        said.push(Sentence::of(Seen, text).at(*ended));
+        said.push(Sentence::of(
+            Likely,
+            "another master speaks on the line: it may have written to the drive",
+        ));
+    }
+    let finding = facts.records.iter().find(|found| {
+        found.what == "line_finding"
+            && found.line == facts.line
+            && (found.time_unix_ms - at).abs() <= 5 * BESIDE_MS
+    });
+    if let Some(finding) = finding {
+        said.push(
+            Sentence::of(Seen, format!("what was found of its line: {}", finding.text))
+                .at(finding.time_unix_ms),
+        );
+    }
+    said
+}
+
+/// Which bits changed, in words.
+fn bits(before: i64, now: i64) -> String {
+    let changed = (0..16).filter(|bit| (before ^ now) >> bit & 1 == 1);
+    let told = changed.map(|bit| format!("bit {bit} is {} now", now >> bit & 1));
+    told.collect::<Vec<_>>().join(", ")
+}
+
+fn of_departure(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
+    let mut said = vec![Sentence::of(Seen, about.text.clone()), nobody_asked(facts, about.time_unix_ms)];
+    said.extend(seen_beside(facts, about.time_unix_ms));
+    said.push(Sentence::of(
+        NotKnown,
+        "a limit of current or torque, the mains, its settings, or somebody else's reference: which, the line does not show",
+    ));
+    said
+}
+
+/// That nobody here asked for something, where that is known.
+fn nobody_asked(facts: &Facts, at: i64) -> Sentence {
+    match facts.missing(at - OBEYED_MS, at) {
+        None => Sentence::of(Seen, "nobody here asked for it"),
+        Some(why) => Sentence::of(
+            NotKnown,
+            format!("whether somebody here asked for it is not known: no command is recorded, and {why}"),
+        ),
+    }
 }
 
 fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
@@ -47,7 +129,13 @@ fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         (by_watchdog || fault.by_watchdog, is_found || fault.found)
     });
     let text = facts.in_words(about);
-    let mut said = vec![Sentence::of(Said, format!("the drive itself says what it tripped by: {text}"))];
+    let mut said = vec![match text.contains(": ") {
+        true => Sentence::of(Said, format!("the drive itself says what it tripped by: {text}")),
+        false => Sentence::of(NotKnown, "that it tripped the drive shows; by what was not read from it"),
+    }];
+    if let Some(kept) = facts.own_record(about) {
+        said.push(Sentence::of(Said, kept.text.clone()));
+    }
     if is_found {
         let text = "it was found tripped when it was seen again: when that happened is not known";
         said.push(Sentence::of(NotKnown, text));
@@ -80,6 +168,14 @@ fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             Sentence::of(Seen, format!("shortly before it somebody had asked: {}", asked.text))
                 .at(asked.time_unix_ms),
         );
+    }
+    let departed = facts.records.iter().rev().find(|found| {
+        found.what == "output_departed"
+            && facts.is_of_drive(found)
+            && (at - SILENT_MS..=at).contains(&found.time_unix_ms)
+    });
+    if let Some(departed) = departed {
+        said.push(Sentence::of(Seen, format!("before it, its {}", departed.text)).at(departed.time_unix_ms));
     }
     said
 }
@@ -127,7 +223,28 @@ fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     }
     let neighbours = facts.neighbours();
     let lost = facts.elsewhere("lost", at, 2 * TOGETHER_MS);
-    let on_line: Vec<&RecordView> = lost.into_iter().filter(|found| found.line == facts.line).collect();
+    let (on_line, elsewhere): (Vec<&RecordView>, Vec<&RecordView>) =
+        lost.into_iter().partition(|found| found.line == facts.line);
+    if !elsewhere.is_empty() {
+        return vec![
+            Sentence::of(
+                Seen,
+                format!("{} fell silent with it, on other lines too", names_of([&on_line, &elsewhere])),
+            ),
+            Sentence::of(
+                Likely,
+                "what they share across the lines is the likely cause: the mains, the supply of the adapters, or this computer; which of them is not known",
+            ),
+        ];
+    }
+    if let Some(why) =
+        facts.missing(at - 2 * TOGETHER_MS, at + 2 * TOGETHER_MS).filter(|_| on_line.is_empty())
+    {
+        return vec![Sentence::of(
+            NotKnown,
+            format!("whether others fell silent with it is not known: {why}"),
+        )];
+    }
     match on_line.len() {
         0 => {
             let others = match neighbours.is_empty() {
@@ -182,12 +299,9 @@ fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                     Sentence::of(Likely, format!("a command of here came shortly before: {}", asked.text))
                         .at(asked.time_unix_ms),
                 ),
-                None if facts.is_cut => said.push(Sentence::of(
-                    NotKnown,
-                    "no command of here is among what was read, and more is recorded",
-                )),
-                None => said.push(Sentence::of(Seen, "nobody here asked for it")),
+                None => said.push(nobody_asked(facts, about.time_unix_ms)),
             }
+            said.extend(seen_beside(facts, about.time_unix_ms));
             said.push(Sentence::of(
                 NotKnown,
                 "its terminals, its panel, another master or the drive itself: which of them it was is not known, but for what its words show below",
@@ -263,6 +377,10 @@ fn body_of_alarm(found: &RecordView) -> Option<String> {
     }
     let alarm: Alarm = serde_json::from_str(found.body.as_ref()?.get()).ok()?;
     Some(alarm.kind)
+}
+
+fn names_of<const N: usize>(found: [&Vec<&RecordView>; N]) -> String {
+    names(&found.into_iter().flatten().copied().collect::<Vec<_>>())
 }
 
 fn names(found: &[&RecordView]) -> String {

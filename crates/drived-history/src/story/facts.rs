@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::{
     quantity::Quantity,
-    read::{Filter, Found, pieces, records},
+    read::{Filter, Found, bounds, line_minutes, pieces, records},
     store::StoreError,
 };
 
@@ -32,14 +32,21 @@ pub(super) struct Facts {
     pub(super) known: f64,
     /// Times in which nothing is, longer than a few polls.
     pub(super) gaps: Vec<(i64, i64)>,
+    /// What its inputs showed, from each of these moments on.
+    pub(super) inputs: Vec<(i64, i64)>,
+    /// How many frames of somebody else its line heard, minute by minute: when the minute ended, and how many.
+    pub(super) foreigners: Vec<(i64, i64)>,
 }
 
+/// So long before a stream that was begun anew something may be missing.
+const TOLD_AGAIN_MS: i64 = 60_000;
 /// A gap that is told: shorter ones are lost polls.
 const GAP_MS: i64 = 5_000;
 
 impl Facts {
     pub(super) fn gather(connection: &Connection, drive: &str, at: i64) -> Result<Self, StoreError> {
-        let (first, last) = kept(connection)?;
+        let (first, last) = bounds(connection)?;
+        let (first, last) = (first.unwrap_or(i64::MAX / 2), last.unwrap_or(i64::MIN / 2));
         let (from, to) = ((at - BEFORE_MS).max(first), (at + AFTER_MS).min(last));
         let filter = Filter { from_ms: from, to_ms: to, limit: RECORDS, ..Filter::default() };
         let Found { records, is_cut } = records(connection, &filter)?;
@@ -62,7 +69,59 @@ impl Facts {
             gaps.push((until, to));
         }
         let known = known as f64 / (to - from).max(1) as f64;
-        Ok(Self { drive: drive.to_owned(), line, from, to, records, is_cut, known, gaps })
+        let inputs = pieces(connection, drive, Quantity::INPUTS, from, to)?
+            .into_iter()
+            .flat_map(|piece| piece.points)
+            .filter_map(|point| Some((point.at, point.count?)))
+            .collect();
+        let foreigners = line_minutes(connection, from, to, RECORDS)?
+            .into_iter()
+            .filter(|minute| Some(&minute.line) == line.as_ref() && minute.foreign > 0)
+            .map(|minute| (minute.time_unix_ms, minute.foreign))
+            .collect();
+        let drive = drive.to_owned();
+        Ok(Self { drive, line, from, to, records, is_cut, known, gaps, inputs, foreigners })
+    }
+
+    /// Why something may have been asked for or have happened between two moments that is not among the records; `None`: nothing is missing.
+    pub(super) fn missing(&self, from: i64, to: i64) -> Option<String> {
+        if self.is_cut {
+            return Some("more is recorded than was looked at".to_owned());
+        }
+        let mut ended = None;
+        for found in self.records.iter().filter(|found| found.kind == "history") {
+            let (at, body) = (found.time_unix_ms, body(found));
+            let (since, why) = match &*found.what {
+                "ended" => {
+                    ended = Some(at);
+                    continue;
+                }
+                "began_after_kill" => {
+                    (body.last_known_unix_ms.unwrap_or(i64::MIN), "this program had been killed")
+                }
+                "began" => (ended.unwrap_or(i64::MIN), "this program did not run"),
+                "hole" if body.records != Some(0) => {
+                    (body.since_unix_ms.unwrap_or(i64::MIN), "records could not be kept")
+                }
+                "damaged" => (i64::MIN, "what was kept before was damaged"),
+                "stream_anew" => (at - TOLD_AGAIN_MS, "what was told may have been missed"),
+                _ => continue,
+            };
+            if since <= to && at >= from {
+                return Some(why.to_owned());
+            }
+        }
+        match ended {
+            Some(ended) if ended <= to && !self.began_after(ended) => {
+                Some("this program had ended".to_owned())
+            }
+            _ => None,
+        }
+    }
+
+    fn began_after(&self, ended: i64) -> bool {
+        let is_beginning = |found: &&RecordView| matches!(&*found.what, "began" | "began_after_kill");
+        self.records.iter().filter(is_beginning).any(|found| found.time_unix_ms >= ended)
     }
 
     /// Whether a record is of this drive: what happened to it, or a command that was for it too.
@@ -85,6 +144,12 @@ impl Facts {
         // What is explained behind the next trip is that one.
         let mut own = later.take_while(|found| found.what != "tripped");
         own.find(|found| found.what == "trip_explained").filter(|_| trip.what == "tripped")
+    }
+
+    /// The drive's own record of its faults, where it was read behind a trip.
+    pub(super) fn own_record(&self, trip: &RecordView) -> Option<&RecordView> {
+        let later = self.records.iter().filter(|found| found.number > trip.number && self.is_of_drive(found));
+        later.take_while(|found| found.what != "tripped").find(|found| found.what == "fault_record")
     }
 
     /// An event in words, a trip with what the drive said of it.
@@ -111,18 +176,6 @@ impl Facts {
         };
         self.records.iter().filter(is_one).collect()
     }
-}
-
-/// When the history begins, and when it ends now.
-fn kept(connection: &Connection) -> Result<(i64, i64), StoreError> {
-    let bounds = connection.query_row(
-        "SELECT (SELECT min(wall_ms) FROM record),
-                max((SELECT max(wall_ms) FROM record), (SELECT coalesce(max(end_ms), 0) FROM flush),
-                    (SELECT coalesce(max(end_ms), 0) FROM block WHERE id = (SELECT max(id) FROM block)))",
-        [],
-        |row| Ok((row.get::<_, Option<i64>>(0)?, row.get::<_, Option<i64>>(1)?)),
-    )?;
-    Ok((bounds.0.unwrap_or(i64::MAX / 2), bounds.1.unwrap_or(i64::MIN / 2)))
 }
 
 /// The times in which something is known, of points that end with nothing.
@@ -171,6 +224,11 @@ pub(super) struct Body {
     pub(super) words: Vec<Word>,
     #[serde(default)]
     pub(super) last_known_unix_ms: Option<i64>,
+    #[serde(default)]
+    pub(super) since_unix_ms: Option<i64>,
+    /// How many records could not be kept.
+    #[serde(default)]
+    pub(super) records: Option<u64>,
     #[serde(default)]
     pub(super) outcome: Option<String>,
 }

@@ -25,7 +25,7 @@ const COURSE_AFTER_MS: i64 = 300_000;
 const COURSE: usize = 60;
 
 /// What a story is about, the weightiest first.
-const WEIGHT: [&str; 16] = [
+const WEIGHT: [&str; 17] = [
     "tripped",
     "stop_unconfirmed",
     "other_family",
@@ -37,6 +37,7 @@ const WEIGHT: [&str; 16] = [
     "control_taken",
     "watchdog_not_in_force",
     "lost",
+    "output_departed",
     "state_changed",
     "stop",
     "start",

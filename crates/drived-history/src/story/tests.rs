@@ -247,3 +247,142 @@ fn a_trip_by_the_watchdog_behind_a_cut_line_is_told_by_the_silence_and_never_by_
         "{story:?}"
     );
 }
+
+/// A history that is written by hand: what happened to `pump 1` on line `north`, and what the history tells of itself.
+struct Written {
+    _folder: Folder,
+    store: store::Store,
+    archive: Archive,
+}
+
+const fn on_wall(steady_ms: i64) -> Moment {
+    Moment { steady_ms, wall_ms: NIGHT_MS + steady_ms }
+}
+
+impl Written {
+    fn begin(name: &str) -> Self {
+        let folder = Folder::new(&format!("history-night-{name}"));
+        let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+        let mut archive = Archive::begin(on_wall(0));
+        archive.begin_run(&mut store.connection, "test").unwrap();
+        Self { _folder: folder, store, archive }
+    }
+
+    fn event(&mut self, at: i64, what: &str, text: &str, body: Option<serde_json::Value>) {
+        let record = Record::of_history(on_wall(at), what, text);
+        let (drive, line) = (Some("pump 1".to_owned()), Some("north".to_owned()));
+        let body = body.map(|body| body.to_string());
+        self.archive.record(Record { kind: Kind::Event, drive, line, body, ..record });
+    }
+
+    fn stops(&mut self, at: i64) {
+        let body = serde_json::json!({ "from": "running", "to": "ready", "cause": { "by": "drive" } });
+        self.event(at, "state_changed", "state changed: running to ready", Some(body));
+    }
+
+    /// It is killed, and begins again.
+    fn killed_until(&mut self, at: i64) {
+        self.archive.write_records(&mut self.store.connection, on_wall(at)).unwrap();
+        self.archive = Archive::begin(on_wall(at));
+        self.archive.begin_run(&mut self.store.connection, "test").unwrap();
+    }
+
+    fn told(mut self, at: i64) -> Story {
+        self.archive.end_run(&mut self.store.connection, on_wall(900_000)).unwrap();
+        tell(&self.store.connection, "pump 1", NIGHT_MS + at).unwrap()
+    }
+}
+
+#[test]
+fn that_nobody_asked_is_told_only_where_nothing_is_missing() {
+    let is_sure = |story: &Story| story.why(Certainty::Seen).contains("nobody here asked for it");
+    let is_open = |story: &Story| {
+        story.why(Certainty::NotKnown).contains("whether somebody here asked for it is not known")
+    };
+    let mut whole = Written::begin("whole");
+    whole.stops(300_000);
+    let story = whole.told(300_000);
+    assert!(is_sure(&story) && !is_open(&story), "{story:?}");
+
+    let mut hole = Written::begin("hole");
+    let lost = crate::write::inbox::Lost { values: 0, records: 3 };
+    let batch = crate::write::inbox::Batch { lost, ..crate::write::inbox::Batch::default() };
+    hole.archive.take(batch, on_wall(295_000));
+    hole.stops(300_000);
+    hole.archive.write_records(&mut hole.store.connection, on_wall(301_000)).unwrap();
+    let story = hole.told(300_000);
+    assert!(is_open(&story) && !is_sure(&story), "{story:?}");
+    assert!(story.why(Certainty::NotKnown).contains("records could not be kept"), "{story:?}");
+
+    // Readings that were not kept hide no command.
+    let mut readings = Written::begin("readings");
+    let lost = crate::write::inbox::Lost { values: 3, records: 0 };
+    let batch = crate::write::inbox::Batch { lost, ..crate::write::inbox::Batch::default() };
+    readings.archive.take(batch, on_wall(295_000));
+    readings.stops(300_000);
+    readings.archive.write_records(&mut readings.store.connection, on_wall(301_000)).unwrap();
+    assert!(is_sure(&readings.told(300_000)));
+
+    let mut killed = Written::begin("behind-kill");
+    killed.event(200_000, "connected", "connected: running", None);
+    killed.killed_until(299_000);
+    killed.stops(300_000);
+    let story = killed.told(300_000);
+    assert!(is_open(&story) && !is_sure(&story), "{story:?}");
+    assert!(story.why(Certainty::NotKnown).contains("this program had been killed"), "{story:?}");
+
+    let mut first = Written::begin("first");
+    first.stops(2_000);
+    let story = first.told(2_000);
+    assert!(is_open(&story) && !is_sure(&story), "nothing is known of before: {story:?}");
+}
+
+#[test]
+fn a_trip_that_was_not_explained_is_not_told_as_if_the_drive_had_said_why() {
+    let mut night = Written::begin("unexplained");
+    night.event(
+        300_000,
+        "tripped",
+        "tripped",
+        fault(false, false).map(|body| serde_json::from_str(&body).unwrap()),
+    );
+    let story = night.told(300_000);
+    assert!(!story.why(Certainty::Said).contains("what it tripped by"), "{story:?}");
+    assert!(story.why(Certainty::NotKnown).contains("by what was not read"), "{story:?}");
+}
+
+#[test]
+fn what_the_drive_itself_keeps_of_its_faults_is_told_with_the_trip() {
+    let mut night = Written::begin("own-record");
+    night.event(300_000, "tripped", "tripped: 18 ObF: DC bus overvoltage", None);
+    let text = "its own record of faults, in its own order: 18 ObF: DC bus overvoltage; 5 SLF: Modbus";
+    night.event(300_500, "fault_record", text, None);
+    let story = night.told(300_000);
+    assert!(story.why(Certainty::Said).contains("5 SLF: Modbus"), "{story:?}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_reference_that_another_master_wrote_is_told_as_the_drive_shows_it_and_nobody_is_named() {
+    let night = Night::begin(1).await;
+    let at = night.now();
+    // LFr, 8502, in tenths of a hertz: BBV51701.
+    night.plant.machines[0].written_by_another(8_502, 180).unwrap();
+    let story = night.asked("reference", "pump 1", at).await;
+    assert!(story.about.as_ref().unwrap().text.starts_with("reference taken"), "{story:?}");
+    assert!(story.why(Certainty::Said).contains("another master has written"), "{story:?}");
+    assert!(
+        !story.why(Certainty::NotKnown).is_empty() && story.why(Certainty::Likely).is_empty(),
+        "{story:?}"
+    );
+}
+
+#[test]
+fn an_output_that_left_its_setpoint_without_a_command_is_a_fact_with_what_may_be_behind_it() {
+    let mut night = Written::begin("departed");
+    let text = "output left its setpoint of 30.00 Hz without a command of here: it is at 18.00 Hz";
+    night.event(300_000, "output_departed", text, None);
+    let story = night.told(300_000);
+    assert_eq!(story.about.as_ref().unwrap().text, text);
+    assert!(story.why(Certainty::Seen).contains("nobody here asked for it"), "{story:?}");
+    assert!(story.why(Certainty::NotKnown).contains("a limit of current or torque"), "{story:?}");
+}

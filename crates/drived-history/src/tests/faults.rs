@@ -3,7 +3,7 @@
 use std::{fs, os::unix::fs::PermissionsExt as _, time::Duration};
 
 use drived_config::testing::Folder;
-use drived_plant::plant::past::RecordView;
+use drived_plant::plant::past::{ParameterRead, RecordView};
 use rusqlite::Connection;
 use tokio::sync::watch;
 
@@ -11,10 +11,11 @@ use super::{BEGIN_MS, Pump, event, moment};
 use crate::{
     quantity::Quantity,
     read::{Filter, History, records},
-    record::Moment,
+    record::{Moment, Setting},
     store::{self, StoreError, schema},
     write::{
         Limits,
+        age::Lived,
         archive::Archive,
         inbox::{Batch, Inbox, Lost},
         tidy,
@@ -207,20 +208,77 @@ fn what_is_too_much_goes_and_what_is_finest_goes_first() {
     archive.end_run(&mut store.connection, moment(200_000_000)).unwrap();
     let end = BEGIN_MS + 210_000_000;
     while tidy::compact(&mut store.connection, end).unwrap() {}
-    let count = |table: &str| -> i64 {
-        store.connection.query_row(&format!("SELECT count(*) FROM {table}"), [], |row| row.get(0)).unwrap()
+    let count = |connection: &Connection, table: &str| -> i64 {
+        connection.query_row(&format!("SELECT count(*) FROM {table}"), [], |row| row.get(0)).unwrap()
     };
-    let (hours, minutes, records) = (count("hour"), count("minute"), count("record"));
-    assert!(count("block") > 50 && hours > 50, "{} {hours}", count("block"));
-    let limits = Limits { bytes: 300_000, ..Limits::default() };
-    assert!(tidy::used_bytes(&store.connection).unwrap() > limits.bytes);
-    while tidy::trim(&store.connection, end, &limits).unwrap() {}
+    let counts = |connection: &Connection| ["hour", "minute", "record"].map(|table| count(connection, table));
+    let before = counts(&store.connection);
+    let blocks = count(&store.connection, "block");
+    assert!(blocks > 50 && before[0] > 50, "{blocks} {before:?}");
+    let limits = Limits { bytes: tidy::used_bytes(&store.connection).unwrap() * 2 / 3, ..Limits::default() };
+    let lived = |steady_ms| archive.lived(moment(steady_ms));
+    while tidy::trim(&mut store.connection, lived(210_000_000), &limits).unwrap() {}
     assert!(tidy::used_bytes(&store.connection).unwrap() <= limits.bytes);
-    assert!(count("block") < 50, "{}", count("block"));
-    assert_eq!((count("hour"), count("minute"), count("record")), (hours, minutes, records));
-    // By age.
-    while tidy::trim(&store.connection, end + Limits::default().years_ms, &Limits::default()).unwrap() {}
-    assert_eq!((count("block"), count("minute"), count("record")), (0, 0, 0));
+    let (all, blocks) = (blocks, count(&store.connection, "block"));
+    assert!(blocks > 0 && blocks < all, "{blocks} of {all}");
+    assert_eq!(counts(&store.connection), before);
+    // A clock that is twenty years ahead makes nothing older.
+    let ahead = Lived { wall_ms: end + 2 * Limits::default().years_ms, ..lived(211_000_000) };
+    while tidy::trim(&mut store.connection, ahead, &Limits::default()).unwrap() {}
+    assert_eq!((count(&store.connection, "block"), counts(&store.connection)), (blocks, before));
+    // By age: each has its turn within a day.
+    for hour in 0..24 {
+        let old = lived(210_000_000 + Limits::default().years_ms + (25 + hour) * 3_600_000);
+        while tidy::trim(&mut store.connection, old, &Limits::default()).unwrap() {}
+    }
+    assert_eq!((count(&store.connection, "block"), counts(&store.connection)), (0, [0, 0, 0]));
+}
+
+#[test]
+fn a_file_of_the_first_version_is_brought_to_this_one_with_all_that_is_in_it() {
+    let folder = Folder::new("history-first");
+    let path = folder.file("history.sqlite");
+    let first = Connection::open(&path).unwrap();
+    first.execute_batch(schema::FIRST).unwrap();
+    first
+        .execute_batch(
+            "INSERT INTO run (began_ms, program) VALUES (1, 'first');
+             INSERT INTO record (run, steady_ms, wall_ms, kind, what, drive, alarm, text)
+             VALUES (1, 0, 1000, 'event', 'tripped', 'pump', 1, 'tripped')",
+        )
+        .unwrap();
+    first.pragma_update(None, "application_id", schema::APPLICATION).unwrap();
+    first.pragma_update(None, "user_version", 1).unwrap();
+    drop(first);
+    let mut store = store::open(&path).unwrap().store;
+    assert_eq!(schema::version_of(&store.connection).unwrap(), schema::version());
+    let mut archive = Archive::begin(moment(0));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    archive.end_run(&mut store.connection, moment(1_000)).unwrap();
+    assert_eq!(words(&store.connection), ["tripped", "began_after_kill", "ended"]);
+}
+
+#[test]
+fn every_value_of_a_setting_that_was_read_is_kept_with_its_times() {
+    let folder = Folder::new("history-settings");
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    let mut archive = Archive::begin(moment(0));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    for (at, word) in [(1, 30), (2, 30), (3, 50), (4, 30)] {
+        let text = format!("{word} s");
+        let read = ParameterRead { drive: "pump".into(), address: 9_001, code: "ACC", word, text };
+        let setting = Setting { wall_ms: BEGIN_MS + at, read };
+        archive.take(Batch { settings: vec![setting], ..Batch::default() }, moment(at));
+        archive.write_values(&mut store.connection).unwrap();
+    }
+    let told = crate::read::parameters(&store.connection, "pump").unwrap();
+    let told: Vec<_> = told
+        .iter()
+        .map(|one| {
+            (one.raw, &*one.text, one.first_unix_ms - BEGIN_MS, one.last_unix_ms - BEGIN_MS, one.times)
+        })
+        .collect();
+    assert_eq!(told, [(30, "30 s", 1, 2, 2), (50, "50 s", 3, 3, 1), (30, "30 s", 4, 4, 1)]);
 }
 
 /// A writer on a folder, with its inbox and its health.
@@ -304,9 +362,11 @@ fn frames_of_a_trip_are_kept_when_the_values_around_it_are_not() {
         }
     }
     archive.end_run(&mut store.connection, moment(400_000)).unwrap();
-    while crate::write::frames::fill(&mut store.connection, BEGIN_MS + 400_000).unwrap() {}
+    while crate::write::frames::fill(&mut store.connection, archive.run().unwrap(), 400_000).unwrap() {}
     while tidy::compact(&mut store.connection, i64::MAX / 2).unwrap() {}
-    while tidy::trim(&store.connection, BEGIN_MS + 60 * 86_400_000, &Limits::default()).unwrap() {}
+    for at in [4_000_000, 60 * 86_400_000] {
+        while tidy::trim(&mut store.connection, archive.lived(moment(at)), &Limits::default()).unwrap() {}
+    }
     assert_eq!(crate::read::pieces(&store.connection, "pump", HZ, 0, i64::MAX).unwrap(), []);
     let frames = crate::read::frames(&store.connection, "pump", 0, i64::MAX).unwrap();
     let [frame] = &frames[..] else { panic!("{frames:?}") };

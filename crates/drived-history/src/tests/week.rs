@@ -80,7 +80,7 @@ fn every_value_told_is_what_the_drive_showed_within_its_deadband_and_every_gap_i
             archive.close(at);
             archive.write_values(&mut store.connection).unwrap();
             while tidy::compact(&mut store.connection, at.wall_ms).unwrap()
-                || tidy::trim(&store.connection, at.wall_ms, &limits).unwrap()
+                || tidy::trim(&mut store.connection, archive.lived(at), &limits).unwrap()
             {}
         }
     }
@@ -109,13 +109,50 @@ fn every_value_told_is_what_the_drive_showed_within_its_deadband_and_every_gap_i
     }
     assert!(gaps > questions / 200 && gaps < questions / 2, "{gaps} gaps");
     steps_are_those_of_the_reference(&history.0, &reference, steady);
+    drop(history);
+    words_are_told_when_the_values_are_gone(&folder, &reference, steady, &mut random);
+}
+
+/// What is a word is kept at each of its changes, for years: the same questions, when nothing is there any more as it was read.
+fn words_are_told_when_the_values_are_gone(
+    folder: &Folder,
+    reference: &Reference,
+    steady: i64,
+    random: &mut fastrand::Rng,
+) {
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    while tidy::compact(&mut store.connection, i64::MAX / 2).unwrap() {}
+    let whole: i64 = store.connection.query_row("SELECT count(*) FROM flush", [], |row| row.get(0)).unwrap();
+    assert_eq!(whole, 0);
+    store.connection.execute("DELETE FROM block", []).unwrap();
+    let mut gaps = 0;
+    for _ in 0..1_000 {
+        let at = BEGIN_MS + random.i64(-HOUR_MS..steady + HOUR_MS);
+        let expected = reference.at(2, at);
+        gaps += usize::from(expected.is_none());
+        assert_eq!(told(&store.connection, Quantity::STATE, at), expected, "at {at}");
+        assert_eq!(told(&store.connection, Quantity::OUTPUT_FREQUENCY, at), None);
+    }
+    assert!(gaps > 5 && gaps < 500, "{gaps} gaps");
+    // As one story from beginning to end.
+    let mut points = Vec::new();
+    let end = BEGIN_MS + steady;
+    let each = |point| {
+        points.push(point);
+        Ok::<_, store::StoreError>(true)
+    };
+    read::points(&store.connection, "pump", Quantity::STATE, BEGIN_MS, end, each).unwrap();
+    for point in points {
+        assert_eq!(reference.at(2, point.at), point.count, "at {}", point.at);
+    }
 }
 
 /// Steps of a minute and of an hour against sums made millisecond by millisecond over what was shown.
 fn steps_are_those_of_the_reference(connection: &Connection, reference: &Reference, steady: i64) {
     let quantity = Quantity::OUTPUT_FREQUENCY;
     for length in [60_000, HOUR_MS] {
-        let steps = read::steps(connection, "pump", quantity, BEGIN_MS, BEGIN_MS + steady, length).unwrap();
+        let steps =
+            read::steps(connection, "pump", quantity, BEGIN_MS, BEGIN_MS + steady, length, &|| true).unwrap();
         for step in steps.iter().step_by(steps.len().div_ceil(40)) {
             let (start, end) = (step.start_unix_ms, step.start_unix_ms + length);
             let (mut known, mut sum, mut least, mut greatest) = (0, 0.0, i64::MAX, i64::MIN);

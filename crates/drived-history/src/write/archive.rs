@@ -8,14 +8,16 @@ use std::{
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 
 use super::{
+    age::{self, Lived},
     frames,
     inbox::{Batch, Lost, Shown},
 };
 use crate::{
     chunk::Chunk,
+    forward::Place,
     quantity::Set,
     read::SOURCE_BITS,
-    record::{LineMinute, Moment, Record},
+    record::{LineMinute, Moment, Record, Setting},
     store::StoreError,
 };
 
@@ -64,6 +66,10 @@ pub struct Archive {
     closed: VecDeque<Flush>,
     records: VecDeque<Record>,
     lines: Vec<LineMinute>,
+    settings: Vec<Setting>,
+    sent: BTreeMap<String, Place>,
+    /// For how long daemons had run with this file before this run began.
+    lived_before_ms: i64,
     flushed_at: i64,
     lost: Lost,
     lost_since: Option<Moment>,
@@ -81,6 +87,9 @@ impl Archive {
             closed: VecDeque::new(),
             records: VecDeque::new(),
             lines: Vec::new(),
+            settings: Vec::new(),
+            sent: BTreeMap::new(),
+            lived_before_ms: 0,
             flushed_at: now.steady_ms,
             lost: Lost::default(),
             lost_since: None,
@@ -101,6 +110,21 @@ impl Archive {
             self.lose(Lost { records: records as u64, values: 0 }, now);
         }
         self.lines.truncate(RECORDS);
+        self.settings.extend(batch.settings);
+        self.settings.truncate(RECORDS);
+        self.sent.extend(batch.sent);
+    }
+
+    /// For how long daemons have run with this file, this one among them.
+    #[must_use]
+    pub const fn lived(&self, now: Moment) -> Lived {
+        Lived { lived_ms: self.lived_before_ms + now.steady_ms, wall_ms: now.wall_ms }
+    }
+
+    /// The run in the file, once it is there.
+    #[must_use]
+    pub const fn run(&self) -> Option<i64> {
+        self.run
     }
 
     /// Takes a record.
@@ -188,16 +212,17 @@ impl Archive {
                 Ok((row.get(0)?, row.get(1)?))
             })
             .optional()?;
+        let lived = age::lived(&transaction)?;
         transaction.execute(
-            "INSERT INTO run (began_ms, program) VALUES (?1, ?2)",
-            params![began.wall_ms, program],
+            "INSERT INTO run (began_ms, program, lived_ms) VALUES (?1, ?2, ?3)",
+            params![began.wall_ms, program, lived],
         )?;
         let run = transaction.last_insert_rowid();
         let text = match before {
             None => "the history begins: nothing is known of before".to_owned(),
             Some((_, Some(_))) => "the daemon began; the run before had ended as it should".to_owned(),
             Some((_, None)) => {
-                "the daemon began; the run before ended without a word: it was killed, or power was cut"
+                "the daemon began; the run before ended without a word: it was killed, power was cut, or its end could not be written"
                     .to_owned()
             }
         };
@@ -212,7 +237,7 @@ impl Archive {
         }
         insert(&transaction, run, &began_record)?;
         transaction.commit()?;
-        self.run = Some(run);
+        (self.run, self.lived_before_ms) = (Some(run), lived - began.steady_ms);
         Ok(())
     }
 
@@ -225,7 +250,7 @@ impl Archive {
         let transaction = connection.transaction()?;
         for record in &self.records {
             insert(&transaction, run, record)?;
-            frames::note(&transaction, record)?;
+            frames::note(&transaction, run, record)?;
         }
         if let Some(since) = self.lost_since {
             insert(&transaction, run, &hole(self.lost, since, now))?;
@@ -261,6 +286,23 @@ impl Archive {
             transaction.commit()?;
             self.lines.clear();
         }
+        if !self.settings.is_empty() {
+            let transaction = connection.transaction()?;
+            self.settings.iter().try_for_each(|setting| keep_setting(&transaction, setting))?;
+            transaction.commit()?;
+            self.settings.clear();
+        }
+        if !self.sent.is_empty() {
+            let transaction = connection.transaction()?;
+            for (target, place) in &self.sent {
+                transaction.execute(
+                    "INSERT OR REPLACE INTO sent (target, segment, until_ms) VALUES (?1, ?2, ?3)",
+                    params![target, place.segment, place.until_ms],
+                )?;
+            }
+            transaction.commit()?;
+            self.sent.clear();
+        }
         Ok(())
     }
 
@@ -275,6 +317,7 @@ impl Archive {
         self.write_records(connection, now)?;
         if let Some(run) = self.run {
             connection.execute("UPDATE run SET ended_ms = ?2 WHERE id = ?1", params![run, now.wall_ms])?;
+            age::mark(connection, self.lived(now), 0)?;
         }
         Ok(())
     }
@@ -378,8 +421,9 @@ fn insert(transaction: &Transaction<'_>, run: i64, record: &Record) -> rusqlite:
 fn insert_line(transaction: &Transaction<'_>, minute: &LineMinute) -> rusqlite::Result<()> {
     let number = |count: u64| i64::try_from(count).unwrap_or(i64::MAX);
     let mut insert = transaction.prepare_cached(
-        "INSERT OR REPLACE INTO line_minute (wall_ms, line, sent, answered, damaged, missing, busy_permille, is_open)
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+        "INSERT OR REPLACE INTO line_minute
+            (wall_ms, line, sent, answered, damaged, missing, busy_permille, is_open, foreigners, silences, silence_us)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
     )?;
     insert.execute(params![
         minute.wall_ms,
@@ -390,6 +434,32 @@ fn insert_line(transaction: &Transaction<'_>, minute: &LineMinute) -> rusqlite::
         number(minute.missing),
         number(minute.busy_permille),
         minute.is_open,
+        number(minute.foreign),
+        number(minute.silences),
+        minute.silence_us.map(number),
     ])?;
+    Ok(())
+}
+
+/// A setting that is read again as it was read last is not kept again: only that it was.
+fn keep_setting(transaction: &Transaction<'_>, setting: &Setting) -> rusqlite::Result<()> {
+    let Setting { wall_ms, read } = setting;
+    let mut find = transaction.prepare_cached(
+        "SELECT id, word FROM parameter WHERE drive = ?1 AND address = ?2 ORDER BY id DESC LIMIT 1",
+    )?;
+    let last: Option<(i64, u16)> = find
+        .query_row(params![&*read.drive, read.address], |row| Ok((row.get(0)?, row.get(1)?)))
+        .optional()?;
+    match last.filter(|(_, word)| *word == read.word) {
+        Some((id, _)) => transaction
+            .prepare_cached("UPDATE parameter SET last_ms = ?2, times = times + 1 WHERE id = ?1")?
+            .execute(params![id, wall_ms])?,
+        None => transaction
+            .prepare_cached(
+                "INSERT INTO parameter (drive, address, code, word, text, first_ms, last_ms, times)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?6, 1)",
+            )?
+            .execute(params![&*read.drive, read.address, read.code, read.word, read.text, wall_ms])?,
+    };
     Ok(())
 }

@@ -1,13 +1,15 @@
 //! What waits for the writer: [`Inbox`], which takes or refuses at once, whatever the disk does.
 
 use std::{
+    collections::BTreeMap,
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
 
 use crate::{
+    forward::Place,
     quantity::Set,
-    record::{LineMinute, Record},
+    record::{LineMinute, Record, Setting},
     tracker::Seen,
 };
 
@@ -30,6 +32,9 @@ pub struct Batch {
     pub shown: Vec<Shown>,
     pub records: Vec<Record>,
     pub lines: Vec<LineMinute>,
+    pub settings: Vec<Setting>,
+    /// How far was sent on, by where to.
+    pub sent: BTreeMap<String, Place>,
     pub lost: Lost,
     pub is_end: bool,
 }
@@ -102,9 +107,18 @@ impl Inbox {
         }
     }
 
-    /// Somebody has lost records before they came here.
-    pub fn lose_records(&self, records: u64) {
-        self.lock().lost.records += records;
+    /// Takes a setting that was read.
+    pub fn setting(&self, setting: Setting) {
+        let mut waiting = self.lock();
+        match waiting.settings.len() < RECORDS {
+            true => waiting.settings.push(setting),
+            false => waiting.lost.records += 1,
+        }
+    }
+
+    /// Takes how far was sent on.
+    pub fn sent(&self, target: String, place: Place) {
+        self.lock().sent.insert(target, place);
     }
 
     /// Nothing comes any more.

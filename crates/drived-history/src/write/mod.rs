@@ -1,6 +1,8 @@
 //! The writing half: what the daemon tells is [taken](inbox) without waiting, [gathered](archive) in memory, and written by one thread.
 
+pub mod age;
 pub mod archive;
+mod changes;
 pub mod frames;
 pub mod inbox;
 mod limits;

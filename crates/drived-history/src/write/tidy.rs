@@ -2,13 +2,17 @@
 
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 
-use super::Limits;
+use super::{
+    Limits,
+    age::{self, Lived},
+    changes,
+};
 use crate::{
     chunk::Chunk,
     column::pack,
     curve::{Piece, Step, Steps, joined},
-    quantity::Quantity,
-    read::{SOURCE_BITS, pack_minutes},
+    quantity::{Quantity, TABLE},
+    read::{SOURCE_BITS, pack_steps},
     store::StoreError,
 };
 
@@ -16,6 +20,8 @@ const MINUTE_MS: i64 = 60_000;
 const HOUR_MS: i64 = 3_600_000;
 /// So many rows go at once, so that nothing else waits for long.
 const AT_ONCE: i64 = 500;
+/// Likewise where the file is too large: no more goes than has to.
+const FEW: i64 = 20;
 
 /// Makes blocks of one source of the oldest hour that is over; gives whether there may be more.
 ///
@@ -119,6 +125,9 @@ impl Hour {
                 points,
                 pack(piece.start, &piece.points),
             ])?;
+        if quantity.is_kept_by_changes() {
+            changes::keep(transaction, source, quantity, self.segment, &piece)?;
+        }
         if !quantity.is_number() {
             return Ok(());
         }
@@ -131,7 +140,7 @@ impl Hour {
                 .prepare_cached(
                     "INSERT INTO minute (source, quantity, start_ms, data) VALUES (?1, ?2, ?3, ?4)",
                 )?
-                .execute(params![source, quantity.0, start, pack_minutes(*start, &minutes)])?;
+                .execute(params![source, quantity.0, start, pack_steps(MINUTE_MS, *start, &minutes)])?;
         }
         for (start, step) in hours.all {
             transaction
@@ -174,49 +183,150 @@ fn short(piece: Piece) -> Vec<Piece> {
 
 /// What belongs to a freeze-frame that is gone.
 const NO_FRAME: &str = "DELETE FROM frame_block WHERE frame NOT IN (SELECT id FROM frame)";
+/// So many hours of a quantity are packed together, when
+const HOURS_A_PACK: usize = 720;
+/// so many younger ones stand beside them as rows, for the tools of others.
+const HOURS_AS_ROWS: usize = 2_160;
 
-/// Takes away some of what is too old, or, where the file is too large, of what is oldest; gives whether there may be more.
+/// Takes away some of what is too old, or, where the file is too large, of what is oldest; gives whether there may be more. What is too old
+/// is told by how long daemons have run since it was written: see [`age`].
 ///
 /// # Errors
 /// It cannot be read or written.
-pub fn trim(connection: &Connection, now_ms: i64, limits: &Limits) -> Result<bool, StoreError> {
-    let old = [
-        ("block", "end_ms", limits.polled_ms),
-        ("minute", "start_ms", limits.minutes_ms),
-        ("record", "wall_ms", limits.years_ms),
-        ("frame", "at_ms", limits.years_ms),
-    ];
+pub fn trim(connection: &mut Connection, now: Lived, limits: &Limits) -> Result<bool, StoreError> {
+    if age::mark(connection, now, age::MARKED_EVERY_MS)? {
+        trim_series(connection, now, limits)?;
+        age::forget(connection, now, limits.years_ms)?;
+    }
     let mut gone = 0;
-    for (table, column, age) in old {
-        gone += trim_table(connection, table, &format!("{column} < {}", now_ms.saturating_sub(age)))?;
+    if let Some(then) = age::newest_then(connection, now, limits.polled_ms)? {
+        gone += trim_table(connection, "block", then.block)?;
     }
-    gone += connection
-        .execute("DELETE FROM hour WHERE start_ms < ?1", [now_ms.saturating_sub(limits.years_ms)])?;
-    gone += connection
-        .execute("DELETE FROM line_minute WHERE wall_ms < ?1", [now_ms.saturating_sub(limits.minutes_ms)])?;
+    if let Some(then) = age::newest_then(connection, now, limits.minutes_ms)? {
+        gone += trim_table(connection, "minute", then.minute)?;
+    }
+    if let Some(then) = age::newest_then(connection, now, limits.years_ms)? {
+        gone += trim_table(connection, "record", then.record)?;
+        gone += trim_frames(connection, then.frame)?;
+    }
     if used_bytes(connection)? > limits.bytes {
-        // What is finest goes first: an hour of ten years ago tells more than a second of yesterday.
-        for table in ["block", "minute", "frame"] {
-            gone += trim_table(connection, table, "1")?;
-            if gone > 0 {
-                connection.execute(NO_FRAME, [])?;
-                return Ok(true);
-            }
-        }
-        gone +=
-            connection.execute("DELETE FROM hour WHERE start_ms = (SELECT min(start_ms) FROM hour)", [])?;
-        gone += trim_table(connection, "record", "1")?;
+        gone += trim_largest(connection)?;
     }
-    connection.execute(NO_FRAME, [])?;
     Ok(gone > 0)
 }
 
-/// The oldest rows of a table, as far as they are so.
-fn trim_table(connection: &Connection, table: &str, so: &str) -> Result<usize, StoreError> {
+/// What is finest goes first: an hour of ten years ago tells more than a second of yesterday.
+fn trim_largest(connection: &Connection) -> Result<usize, StoreError> {
+    for table in ["block", "minute"] {
+        let gone = trim_table(connection, table, i64::MAX)?;
+        if gone > 0 {
+            return Ok(gone);
+        }
+    }
+    let gone = trim_frames(connection, i64::MAX)?;
+    if gone > 0 {
+        return Ok(gone);
+    }
+    let mut gone = 0;
+    for (table, key) in [("hours", "start_ms"), ("hour", "start_ms"), ("change", "at_ms")] {
+        gone += connection.execute(
+            &format!(
+                "DELETE FROM {table} WHERE (source, quantity, {key}) IN
+                    (SELECT source, quantity, {key} FROM {table} ORDER BY {key} LIMIT {AT_ONCE})"
+            ),
+            [],
+        )?;
+        if gone > 0 {
+            break;
+        }
+    }
+    Ok(gone + trim_table(connection, "record", i64::MAX)?)
+}
+
+/// What has no place in an order goes once nothing that is younger can have its time. Each source has its turn once in a day.
+fn trim_series(connection: &mut Connection, now: Lived, limits: &Limits) -> Result<(), StoreError> {
+    if let Some(before) = age::all_younger_from(connection, now, limits.minutes_ms)? {
+        connection.execute("DELETE FROM line_minute WHERE wall_ms < ?1", [before])?;
+    }
+    let before = age::all_younger_from(connection, now, limits.years_ms)?;
+    if let Some(before) = before {
+        connection.execute("DELETE FROM parameter WHERE last_ms < ?1", [before])?;
+    }
+    let turn = now.lived_ms.div_euclid(age::MARKED_EVERY_MS).rem_euclid(24);
+    let sources: Vec<i64> = {
+        let mut find = connection.prepare_cached("SELECT id FROM source WHERE id % 24 = ?1")?;
+        let rows = find.query_map([turn], |row| row.get(0))?;
+        rows.collect::<Result<_, _>>()?
+    };
+    for source in sources {
+        let transaction = connection.transaction()?;
+        for (number, _) in (0_u32..).zip(TABLE) {
+            if let Some(before) = before {
+                transaction
+                    .prepare_cached("DELETE FROM hour WHERE source = ?1 AND quantity = ?2 AND start_ms < ?3")?
+                    .execute(params![source, number, before])?;
+            }
+            pack_hours(&transaction, source, Quantity(number))?;
+        }
+        if let Some(before) = before {
+            // A pack goes with the last of its hours.
+            let last = before.saturating_sub(i64::try_from(HOURS_A_PACK).unwrap_or_default() * HOUR_MS);
+            transaction.execute("DELETE FROM hours WHERE source = ?1 AND start_ms < ?2", [source, last])?;
+            transaction.execute("DELETE FROM change WHERE source = ?1 AND at_ms < ?2", [source, before])?;
+        }
+        transaction.commit()?;
+    }
+    Ok(())
+}
+
+/// Packs the oldest hours of a quantity, where enough younger ones stand beside them.
+fn pack_hours(transaction: &Transaction<'_>, source: i64, quantity: Quantity) -> Result<(), StoreError> {
+    loop {
+        let hours: Vec<(i64, Step)> = {
+            let mut find = transaction.prepare_cached(
+                "SELECT start_ms, least, mean, greatest, known_ms FROM hour
+                 WHERE source = ?1 AND quantity = ?2 ORDER BY start_ms LIMIT ?3",
+            )?;
+            let enough = i64::try_from(HOURS_A_PACK + HOURS_AS_ROWS).unwrap_or(i64::MAX);
+            let rows = find.query_map(params![source, quantity.0, enough], |row| {
+                let (least, mean, greatest) = (row.get(1)?, row.get(2)?, row.get(3)?);
+                Ok((row.get(0)?, Step { least, mean, greatest, known_ms: row.get(4)? }))
+            })?;
+            rows.collect::<Result<_, _>>()?
+        };
+        let (Some((start, _)), Some((last, _))) = (hours.first(), hours.get(HOURS_A_PACK - 1)) else {
+            return Ok(());
+        };
+        if hours.len() < HOURS_A_PACK + HOURS_AS_ROWS {
+            return Ok(());
+        }
+        let data = pack_steps(HOUR_MS, *start, &hours[..HOURS_A_PACK]);
+        transaction
+            .prepare_cached(
+                "INSERT OR REPLACE INTO hours (source, quantity, start_ms, data) VALUES (?1, ?2, ?3, ?4)",
+            )?
+            .execute(params![source, quantity.0, start, data])?;
+        transaction
+            .prepare_cached("DELETE FROM hour WHERE source = ?1 AND quantity = ?2 AND start_ms <= ?3")?
+            .execute(params![source, quantity.0, last])?;
+    }
+}
+
+/// The oldest rows of a table, not younger than this one.
+fn trim_table(connection: &Connection, table: &str, last: i64) -> Result<usize, StoreError> {
+    let at_once = if last == i64::MAX { FEW } else { AT_ONCE };
     let sql = format!(
-        "DELETE FROM {table} WHERE id IN (SELECT id FROM (SELECT * FROM {table} ORDER BY id LIMIT {AT_ONCE}) WHERE {so})"
+        "DELETE FROM {table} WHERE id IN (SELECT id FROM {table} WHERE id <= ?1 ORDER BY id LIMIT {at_once})"
     );
-    Ok(connection.prepare_cached(&sql)?.execute([])?)
+    Ok(connection.prepare_cached(&sql)?.execute([last])?)
+}
+
+fn trim_frames(connection: &Connection, last: i64) -> Result<usize, StoreError> {
+    let gone = trim_table(connection, "frame", last)?;
+    if gone > 0 {
+        connection.execute(NO_FRAME, [])?;
+    }
+    Ok(gone)
 }
 
 /// How much of the file is in use.

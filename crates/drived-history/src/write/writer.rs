@@ -8,7 +8,13 @@ use std::{
 
 use tokio::sync::watch;
 
-use super::{Limits, archive::Archive, frames, inbox::Inbox, tidy};
+use super::{
+    Limits,
+    archive::{Archive, FLUSHED_EVERY_MS},
+    frames,
+    inbox::Inbox,
+    tidy,
+};
 use crate::{
     record::{Moment, Record},
     store::{self, Store, StoreError},
@@ -108,9 +114,12 @@ impl<C: Fn() -> Moment> Work<C> {
             }
             let began = Instant::now();
             while self.has_to_tidy && began.elapsed() < TIDIED {
-                self.has_to_tidy = frames::fill(connection, now.wall_ms.saturating_sub(60_000))?
-                    || tidy::compact(connection, now.wall_ms)?
-                    || tidy::trim(connection, now.wall_ms, &self.writer.limits)?;
+                // What was seen by then has been flushed.
+                let known_until = now.steady_ms.saturating_sub(FLUSHED_EVERY_MS);
+                self.has_to_tidy =
+                    frames::fill(connection, self.archive.run().unwrap_or_default(), known_until)?
+                        || tidy::compact(connection, now.wall_ms)?
+                        || tidy::trim(connection, self.archive.lived(now), &self.writer.limits)?;
             }
             Ok(())
         })();

@@ -17,7 +17,7 @@ use super::{
 };
 use drived_plant::plant::{
     Plant,
-    past::{Past, PastError, RecordsAsked, ValuesAsked},
+    past::{CurvesAsked, DaysAsked, GivenUp, Past, PastError, RecordsAsked, ValuesAsked},
 };
 
 /// So many read the disk at once: more would hold up the others, and the machine.
@@ -38,9 +38,21 @@ pub(super) struct Records {
     from_unix_ms: i64,
     to_unix_ms: i64,
     drive: Option<String>,
+    line: Option<String>,
     kind: Option<String>,
+    what: Option<String>,
+    #[serde(default)]
+    only_alarms: bool,
     after: Option<i64>,
+    before: Option<i64>,
     limit: Option<usize>,
+}
+
+/// Between which moments.
+#[derive(Deserialize)]
+pub(super) struct Between {
+    from_unix_ms: i64,
+    to_unix_ms: i64,
 }
 
 /// Which moment.
@@ -61,7 +73,91 @@ pub(super) async fn values(
         return Err(Problem::new(StatusCode::BAD_REQUEST, "every_ms: expected 1 or more"));
     }
     let asked = ValuesAsked { drive, value, from_unix_ms, to_unix_ms, every_ms };
-    told(&plant, move |past| past.values(&asked)).await
+    told(&plant, move |past, given_up| past.values(&asked, given_up)).await
+}
+
+/// What stands in a question in which a key may come more than once.
+struct Keys(Vec<(String, String)>);
+
+impl Keys {
+    fn all(&self, key: &str) -> Vec<String> {
+        self.0.iter().filter(|(name, _)| name == key).map(|(_, value)| value.clone()).collect()
+    }
+
+    fn moment(&self, key: &str) -> Result<i64, Problem> {
+        let said = self.0.iter().find(|(name, _)| name == key);
+        let expected = || Problem::new(StatusCode::BAD_REQUEST, format!("{key}: expected milliseconds"));
+        let number = said.and_then(|(_, value)| value.parse().ok()).ok_or_else(expected)?;
+        are_moments([number]).map(|()| number)
+    }
+}
+
+/// A question whose keys may come more than once.
+type Many = Result<Query<Vec<(String, String)>>, QueryRejection>;
+
+pub(super) async fn curves(State(plant): State<Plant>, _: Viewer, query: Many) -> Result<Response, Problem> {
+    let keys = Keys(query?.0);
+    let asked = CurvesAsked {
+        drives: keys.all("drive"),
+        values: keys.all("value"),
+        from_unix_ms: keys.moment("from_unix_ms")?,
+        to_unix_ms: keys.moment("to_unix_ms")?,
+        every_ms: keys.moment("every_ms")?,
+    };
+    told(&plant, move |past, given_up| past.curves(&asked, given_up)).await
+}
+
+pub(super) async fn days(State(plant): State<Plant>, _: Viewer, query: Many) -> Result<Response, Problem> {
+    let keys = Keys(query?.0);
+    let asked = DaysAsked {
+        drives: keys.all("drive"),
+        from_unix_ms: keys.moment("from_unix_ms")?,
+        to_unix_ms: keys.moment("to_unix_ms")?,
+    };
+    told(&plant, move |past, given_up| past.days(&asked, given_up)).await
+}
+
+pub(super) async fn about(State(plant): State<Plant>, _: Viewer) -> Result<Response, Problem> {
+    told(&plant, |past, _| past.about()).await
+}
+
+pub(super) async fn moment(
+    State(plant): State<Plant>,
+    _: Viewer,
+    query: Result<Query<At>, QueryRejection>,
+) -> Result<Response, Problem> {
+    let Query(At { at_unix_ms }) = query?;
+    are_moments([at_unix_ms])?;
+    told(&plant, move |past, given_up| past.moment(at_unix_ms, given_up)).await
+}
+
+pub(super) async fn lines(
+    State(plant): State<Plant>,
+    _: Viewer,
+    query: Result<Query<Between>, QueryRejection>,
+) -> Result<Response, Problem> {
+    let Query(Between { from_unix_ms, to_unix_ms }) = query?;
+    are_moments([from_unix_ms, to_unix_ms])?;
+    told(&plant, move |past, _| past.lines(from_unix_ms, to_unix_ms)).await
+}
+
+pub(super) async fn frames(
+    State(plant): State<Plant>,
+    _: Viewer,
+    Named(drive): Named,
+    query: Result<Query<Between>, QueryRejection>,
+) -> Result<Response, Problem> {
+    let Query(Between { from_unix_ms, to_unix_ms }) = query?;
+    are_moments([from_unix_ms, to_unix_ms])?;
+    told(&plant, move |past, _| past.frames(&drive, from_unix_ms, to_unix_ms)).await
+}
+
+pub(super) async fn parameters(
+    State(plant): State<Plant>,
+    _: Viewer,
+    Named(drive): Named,
+) -> Result<Response, Problem> {
+    told(&plant, move |past, _| past.parameters(&drive)).await
 }
 
 pub(super) async fn records(
@@ -69,11 +165,23 @@ pub(super) async fn records(
     _: Viewer,
     query: Result<Query<Records>, QueryRejection>,
 ) -> Result<Response, Problem> {
-    let Query(Records { from_unix_ms, to_unix_ms, drive, kind, after, limit }) = query?;
+    let Query(Records {
+        from_unix_ms,
+        to_unix_ms,
+        drive,
+        line,
+        kind,
+        what,
+        only_alarms,
+        after,
+        before,
+        limit,
+    }) = query?;
     are_moments([from_unix_ms, to_unix_ms])?;
     let after = after.unwrap_or_default();
-    let asked = RecordsAsked { from_unix_ms, to_unix_ms, drive, kind, after, limit };
-    told(&plant, move |past| past.records(&asked)).await
+    let asked =
+        RecordsAsked { from_unix_ms, to_unix_ms, drive, line, kind, what, only_alarms, after, before, limit };
+    told(&plant, move |past, _| past.records(&asked)).await
 }
 
 pub(super) async fn why(
@@ -84,7 +192,7 @@ pub(super) async fn why(
 ) -> Result<Response, Problem> {
     let Query(At { at_unix_ms }) = query?;
     are_moments([at_unix_ms])?;
-    told(&plant, move |past| past.story(&drive, at_unix_ms)).await
+    told(&plant, move |past, _| past.story(&drive, at_unix_ms)).await
 }
 
 /// Refuses what is no moment of this calendar: behind it nobody has to think of what overflows. The bounds are those of ECMAScript.
@@ -99,20 +207,31 @@ fn are_moments<const N: usize>(all: [i64; N]) -> Result<(), Problem> {
 /// Asks whoever keeps the past, on a thread that may wait for a disk.
 async fn told<T: Serialize + Send + 'static>(
     plant: &Plant,
-    ask: impl FnOnce(&dyn Past) -> Result<T, PastError> + Send + 'static,
+    ask: impl FnOnce(&dyn Past, &GivenUp) -> Result<T, PastError> + Send + 'static,
 ) -> Result<Response, Problem> {
     let past: Arc<dyn Past> =
         plant.past().ok_or_else(|| Problem::not_found("no history is kept by this program"))?;
     let unreadable = |why: String| Problem::new(StatusCode::SERVICE_UNAVAILABLE, why);
     let place = AT_ONCE.acquire().await.map_err(|error| unreadable(error.to_string()))?;
+    // Whoever goes does not wait any more: what is read for him ends.
+    let waits = Waits(GivenUp::default());
+    let given_up = waits.0.clone();
     let answer = spawn_blocking(move || {
-        // It is given up when it has been read, also where nobody waits for the answer any more.
         let _place = place;
-        ask(&*past).map(|view| fresh(&view))
+        ask(&*past, &given_up).map(|view| fresh(&view))
     });
     match answer.await.map_err(|error| unreadable(error.to_string()))? {
         Ok(answer) => Ok(answer),
         Err(error @ PastError::Asked(_)) => Err(Problem::new(StatusCode::BAD_REQUEST, error.to_string())),
         Err(error) => Err(unreadable(error.to_string())),
+    }
+}
+
+/// Gives up with whoever waits.
+struct Waits(GivenUp);
+
+impl Drop for Waits {
+    fn drop(&mut self) {
+        self.0.give_up();
     }
 }

@@ -188,16 +188,22 @@ impl Plant {
         let mut views = Vec::new();
         for row in drive.capabilities().rows {
             let mut word = self.0.words.of(drive, row);
-            let mut error = None;
+            let (mut error, mut read) = (None, None);
             let is_young = word.is_some_and(|(_, at)| at.elapsed() <= YOUNG);
             if row.access.is_readable() && !is_young && Instant::now() < until {
                 match timeout_at(until, drive.read_parameter(row)).await {
-                    Ok(Ok(raw)) => word = self.0.words.keep(drive, row, Some(raw)),
+                    Ok(Ok(raw)) => {
+                        read = Some(raw);
+                        word = self.0.words.keep(drive, row, Some(raw));
+                    }
                     Ok(Err(refused)) => error = Some(refused.to_string()),
                     Err(_) => {}
                 }
             }
             let shown = self.0.words.in_units(drive, row);
+            if let Some(raw) = read {
+                self.note_parameter(drive, &shown, raw);
+            }
             views.push(ParameterView::of(drive.capabilities(), &shown, word, error));
         }
         views
@@ -210,6 +216,7 @@ impl Plant {
     pub async fn parameter(&self, drive: &DriveHandle, row: &'static Row) -> Result<ParameterView, Refused> {
         let raw = drive.read_parameter(row).await?;
         let shown = self.in_units(drive, row).await?;
+        self.note_parameter(drive, &shown, raw);
         let word = self.0.words.keep(drive, row, Some(raw));
         Ok(ParameterView::of(drive.capabilities(), &shown, word, None))
     }
@@ -240,6 +247,7 @@ impl Plant {
         let Written { changed, storage } = drive.write_parameter(row, word).await?;
         let held = self.0.words.keep(drive, row, Some(word));
         let shown = self.0.words.in_units(drive, row);
+        self.note_parameter(drive, &shown, word);
         let parameter = ParameterView::of(drive.capabilities(), &shown, held, None);
         let how = if changed { "is now" } else { "was already" };
         let kept = match storage {

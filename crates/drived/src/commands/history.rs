@@ -20,6 +20,8 @@ use drived_words::{
 };
 use serde_json::json;
 
+use super::plot;
+
 /// Show what a drive did, and what happened to it, between two moments
 ///
 /// It is read from the history that the daemon keeps, whether that runs or not. A value is told from when it was read to when it was read
@@ -48,6 +50,9 @@ pub(crate) struct Args {
     /// Print comma-separated values, one value or step a line, and nothing of what happened
     #[arg(long, conflicts_with = "json")]
     csv: bool,
+    /// Draw the values as curves, a gap where nothing is known
+    #[arg(long, conflicts_with_all = ["csv", "json"])]
+    plot: bool,
     #[command(flatten)]
     place: HistoryArgs,
     #[command(flatten)]
@@ -163,6 +168,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let quantities = args.values.iter().map(|name| named(name)).collect::<Result<Vec<_>, _>>()?;
     let history = args.place.open(&args.name)?;
     let asked = Asked { drive: &args.name, from, to, history: &history };
+    if args.plot {
+        return asked.plot(&quantities, args.every);
+    }
     match (args.csv, args.json.is_json()) {
         (true, _) => asked.csv(&quantities, args.every),
         (_, true) => asked.json(&quantities, args.every),
@@ -204,7 +212,8 @@ impl Asked<'_> {
                 "expected longer steps than {length_ms} ms: {STEPS} are told at the most"
             )));
         }
-        read::steps(&self.history.0, self.drive, quantity, self.from, self.to, length_ms).map_err(failed)
+        read::steps(&self.history.0, self.drive, quantity, self.from, self.to, length_ms, &|| true)
+            .map_err(failed)
     }
 
     /// Those that are meant, or all of which there is something.
@@ -277,6 +286,42 @@ impl Asked<'_> {
             }
         }
         self.each_record(|found| output::say_as_it_is(json!(found)))
+    }
+
+    fn plot(&self, quantities: &[Quantity], every: Option<Time>) -> Result<(), Failure> {
+        let (from, to) = (self.from, self.to);
+        output::say(format_args!("{}, {} to {} ({})", self.drive, said(from), said(to), offsets(from, to)))?;
+        if let Some(word) = quantities.iter().find(|quantity| !quantity.is_number()) {
+            let text = format!("{word} is no number: without --plot it is told as it changes");
+            return Err(Failure::Input(text));
+        }
+        let shown = SHOWN.into_iter().filter(|quantity| quantity.is_number()).collect();
+        let asked = if quantities.is_empty() { shown } else { quantities.to_vec() };
+        let fitting = (to - from).div_euclid(i64::from(plot::STEPS)).max(1_000);
+        let length = every.map_or(fitting - fitting % 1_000, length);
+        for quantity in asked {
+            let steps: Vec<plot::Step> = self
+                .steps(quantity, length)?
+                .into_iter()
+                .map(|told| {
+                    let Told { start_unix_ms, least, mean, greatest, .. } = told;
+                    plot::Step { place: (start_unix_ms - from) as f64, least, mean, greatest }
+                })
+                .collect();
+            if steps.is_empty() {
+                // Of those that nobody has named only what there is.
+                if !quantities.is_empty() {
+                    output::say(format_args!("{quantity}: nothing is known of that time"))?;
+                }
+                continue;
+            }
+            output::say(format_args!("\n{quantity}"))?;
+            let ends = [said(from), said(to)];
+            for line in plot::drawn(&steps, [0.0, (to - from).max(1) as f64], length as f64, ends) {
+                output::say_as_it_is(line)?;
+            }
+        }
+        Ok(())
     }
 
     fn show(&self, quantities: &[Quantity], every: Option<Time>) -> Result<(), Failure> {

@@ -7,6 +7,8 @@ pub(crate) mod export;
 #[cfg(feature = "history")]
 pub(crate) mod history;
 pub(crate) mod names;
+#[cfg(feature = "history")]
+mod plot;
 pub(crate) mod token;
 #[cfg(feature = "history")]
 pub(crate) mod why;
