@@ -5,6 +5,12 @@ import { FAULTS_FR } from './faults_fr.js';
 
 /** Whole sentences, and the phrases that stand in others. */
 export const SENTENCES_FR = {
+  'the history begins: nothing is known of before': 'l’historique commence : rien n’est connu d’avant',
+  'the daemon began': 'le service a commencé',
+  'the daemon ended as it should': 'le service a pris fin comme il se doit',
+  'the run before had ended as it should': 'le précédent avait pris fin comme il se doit',
+  'the run before ended without a word: it was killed, power was cut, or its end could not be written': 'le précédent a cessé sans un mot : tué, privé de courant, ou sa fin n’a pu être écrite',
+  'the configuration was read again, or too much happened at once: what was told just before may be missing here': 'la configuration a été relue, ou trop de choses sont arrivées à la fois : ce qui fut dit juste avant peut manquer ici',
   // Why a command is refused.
   'the drive is only read: its settings say control = false': 'le variateur est seulement lu : sa configuration indique control = false',
   'the drive does not answer': 'le variateur ne répond pas',
