@@ -760,3 +760,50 @@ fn whoever_stands_behind_a_proxy_that_the_file_tells_of_is_not_local() {
         assert_eq!(config.doors.http.unwrap().freely(false), freely, "{http}");
     }
 }
+
+#[test]
+fn drives_that_were_added_hold_as_long_as_the_configuration_has_none_of_its_own_and_by_their_own_words_alone()
+{
+    let folder = Folder::new("added");
+    let (file, added) = (folder.file("drives.toml"), folder.file(added::FILE));
+    let head = "state = \".\"\n[defaults]\ncontrol = true\non_exit = \"leave\"\n[groups]\nall = [\"pump\"]\n";
+    let own = "[lines.a]\nport = \"/dev/ttyUSB0\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\nname = \"pump\"\n";
+    let theirs = own.replace("atv312@1", "atv28@2");
+    let names = |config: &Config| -> Vec<(String, bool)> {
+        let drives = config.lines.iter().flat_map(|line| &line.drives);
+        drives.map(|drive| (drive.name.to_string(), drive.settings.control)).collect()
+    };
+    std::fs::write(&file, head).unwrap();
+    // A group of a drive that is nowhere is wrong, whichever file it would stand in.
+    assert!(Config::load_or_empty(&file).unwrap_err().to_string().contains("pump"));
+    std::fs::write(&added, &theirs).unwrap();
+    let config = Config::load(&file).unwrap();
+    // What the configuration says of all its drives is not said of these: nobody takes control of them by it.
+    assert_eq!(names(&config), [("atv28@2".to_owned(), false)]);
+    assert!(config.added.as_ref().is_some_and(|added| !added.is_aside));
+    let with = Config::load_with(&file, &theirs.replace("atv28@2", "atv58@3")).unwrap();
+    assert_eq!(names(&with), [("atv58@3".to_owned(), false)]);
+    std::fs::write(&file, format!("{head}{own}")).unwrap();
+    let config = Config::load(&file).unwrap();
+    assert_eq!(names(&config), [("atv312@1".to_owned(), true)]);
+    let aside = config.added.unwrap().aside(&file).expect("it is said");
+    assert!(aside.contains("added.toml") && aside.contains("drives.toml has drives of its own"), "{aside}");
+    // Then nobody reads it, whatever stands there.
+    std::fs::write(&added, "[[drives").unwrap();
+    assert_eq!(names(&Config::load(&file).unwrap()).len(), 1);
+    // A line alone is a plant of its own that is not finished yet, and nothing is put in its place.
+    std::fs::write(&file, format!("{head}[lines.a]\nport = \"/dev/ttyUSB0\"\n")).unwrap();
+    assert!(Config::load_or_empty(&file).unwrap_err().to_string().contains("no drive"));
+    std::fs::write(&file, "state = \".\"\n").unwrap();
+    for (text, wrong) in [
+        (format!("{theirs}running = \"soon\"\n"), "added.toml:7: running"),
+        (format!("shutdown = \"1s\"\n{theirs}"), "added.toml:1: shutdown: expected lines and drives alone"),
+        ("[[drives".to_owned(), "added.toml:1"),
+    ] {
+        std::fs::write(&added, text).unwrap();
+        let told = Config::load(&file).unwrap_err().to_string();
+        assert!(told.contains(wrong), "{told}");
+    }
+    std::fs::remove_file(&added).unwrap();
+    assert!(names(&Config::load_or_empty(&file).unwrap()).is_empty());
+}

@@ -861,27 +861,30 @@ def first_hour(page, url, link, port, keys=False):
     hand.press(page.get_by_role("button", name="Scan", exact=True))
     expect(page.locator("progress")).to_be_visible()
     judged(Axe(), page, "a scan")
-    expect(page.locator("main")).to_contain_text("every address was asked. Found: 2")
+    expect(page.locator("main")).to_contain_text("every address was asked. Found: 3")
     finds = page.locator(".finds .find")
-    expect(finds).to_have_count(2)
+    expect(finds).to_have_count(3)
     expect(finds.first).to_contain_text("by its own words")
+    expect(finds.nth(1).locator("select")).to_have_value("goodrive")
+    expect(finds.nth(1).locator("input[type=checkbox]")).to_be_checked()
     # Whom no register tells is told by his nameplate.
-    expect(finds.nth(1)).to_contain_text("see its nameplate")
-    expect(finds.nth(1).locator("input[type=checkbox]")).not_to_be_checked()
+    stranger = finds.nth(2)
+    expect(stranger).to_contain_text("see its nameplate")
+    expect(stranger.locator("input[type=checkbox]")).not_to_be_checked()
     hand.done += 1
     if keys:
-        hand.reach(finds.nth(1).locator("select"))
+        hand.reach(stranger.locator("select"))
         page.keyboard.type("wj200")
     else:
-        finds.nth(1).locator("select").select_option("wj200")
-    expect(finds.nth(1).locator("select")).to_have_value("wj200")
-    expect(finds.nth(1).locator("input[type=checkbox]")).to_be_checked()
+        stranger.locator("select").select_option("wj200")
+    expect(stranger.locator("select")).to_have_value("wj200")
+    expect(stranger.locator("input[type=checkbox]")).to_be_checked()
     judged(Axe(), page, "who answers")
-    hand.write(finds.first.locator("input[type=text]"), "pump")
-    hand.write(finds.nth(1).locator("input[type=text]"), "fan")
+    for at, name in enumerate(["pump", "blower", "fan"]):
+        hand.write(finds.nth(at).locator("input[type=text]"), name)
     hand.press(page.get_by_role("button", name="Watch these drives"))
     added = page.locator(".added .find")
-    expect(added).to_have_count(2)
+    expect(added).to_have_count(3)
     pump = page.locator(".added .find[data-name=pump]")
     expect(pump).to_have_attribute("data-quality", "good")
     expect(pump).to_contain_text("Read only")
@@ -910,7 +913,7 @@ def first_hour(page, url, link, port, keys=False):
     other.context.close()
     # Whoever comes back finds what was done; no other is asked by it.
     page.goto(url + "#/setup")
-    expect(page.locator(".added .find")).to_have_count(2)
+    expect(page.locator(".added .find")).to_have_count(3)
     # Whoever runs goes on undisturbed by what becomes of others.
     read = "fetch('api/v1/drives/pump').then(answer => answer.json())"
     before = page.evaluate(read)

@@ -52,7 +52,7 @@ fn without_drives_it_begins_says_what_to_do_and_has_those_that_a_scan_writes_dow
     let sim = Sim::serve("begins", &["atv312@1-2"]);
     let file = File::new("begins", "");
     let mut daemon = Running::start(&["run", "--config", file.path()]);
-    daemon.wait_for_log("no drive yet: drived scan --line PORT,19200,8E1 --save");
+    daemon.wait_for_log("no drive yet: find them at the page");
     // It writes no file that is there.
     std::fs::remove_file(file.path()).expect("it is there");
     let line = format!("{},19200,8E1", sim.link());
@@ -70,6 +70,32 @@ fn without_drives_it_begins_says_what_to_do_and_has_those_that_a_scan_writes_dow
     assert_eq!(daemon.interrupt().0, Some(0));
     // Whoever names a file that is not there has misspelt it.
     run(&["run", "--config", "/nowhere/drives.toml"]).assert_refused(2, "cannot be read");
+}
+
+#[test]
+fn a_configuration_that_has_lost_its_drives_does_not_bring_in_those_that_were_added_at_the_page() {
+    let sim = Sim::serve("aside", &["atv312@1-2"]);
+    let state = support::path("aside-state");
+    std::fs::create_dir_all(&state).expect("it can be made");
+    let head = format!("state = {:?}\n", state.to_str().expect("the path is text"));
+    std::fs::write(
+        state.join("added.toml"),
+        configuration(sim.link(), &[(2, "")]).replace("snapshots = \"500ms\"\n", ""),
+    )
+    .expect("it can be written");
+    let file = File::new("aside", &format!("{head}{}", configuration(sim.link(), &[(1, "")])));
+    let mut daemon = Running::start(&["run", "--config", file.path()]);
+    daemon.wait_for_log("added.toml do not hold");
+    let connected = daemon.wait_for(r#""event":"connected""#);
+    assert!(connected.contains("pump 1"), "{connected}");
+    std::fs::write(file.path(), &head).expect("it can be written");
+    daemon.signal("-HUP");
+    daemon.wait_for_log("the old configuration holds on");
+    assert_eq!(daemon.interrupt().0, Some(0));
+    // A start is another matter: they hold then, and it is said by check.
+    let checked = run(&["check", "--config", file.path()]);
+    assert!(checked.assert_done().contains("pump 2"), "{checked:?}");
+    let _ = std::fs::remove_dir_all(state);
 }
 
 #[test]

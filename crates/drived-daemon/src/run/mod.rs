@@ -150,14 +150,15 @@ pub async fn run(args: Args) -> Result<(), Failure> {
         .merge(page::router());
     let sources: Vec<Arc<dyn Source>> = vec![Arc::new(reloader.clone()), Arc::new(faces.clone())];
     let doors = doors.open(metrics::serve(router, plant.clone(), sources));
-    if let Some(file) = beginning {
-        let is_read = std::io::stderr().is_terminal();
-        tokio::spawn(tell_beginning(file, is_read.then(|| doors.link_for_whoever_started("terminal"))));
-    }
     plant.follow_audit(doors.audit().failing());
     let audited = doors.follow(fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());
     let screen = with_table.then(|| table(plant.clone())).flatten();
+    // Below the table: what was said before it is behind it.
+    if let Some(file) = beginning {
+        let is_read = std::io::stderr().is_terminal();
+        tokio::spawn(tell_beginning(file, is_read.then(|| doors.link_for_whoever_started("terminal"))));
+    }
     let mut read = None;
     loop {
         tokio::select! {

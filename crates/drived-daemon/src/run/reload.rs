@@ -258,7 +258,8 @@ impl Reload for Reloader {
         let file = self.0.file.clone();
         // A name of a server may have to be looked up.
         let read = blocking(move || Config::load_workable(&file)).await;
-        let read = read.and_then(|new| no_new_doubt(&config, &new).map(|()| new));
+        let read =
+            read.and_then(|new| no_new_doubt(&config, &new).and(still_own(&config, &new)).map(|()| new));
         if dry_run {
             let changes = changes(&config, &read?);
             return Ok(changes.iter().map(|change| change.would_be(&self.0.plant.fleet())).collect());
@@ -273,6 +274,18 @@ async fn blocking<T: Send + 'static>(
 ) -> Result<T, Failure> {
     let read = tokio::task::spawn_blocking(read).await;
     read.unwrap_or_else(|_| Err(Failure::Input("the file could not be read".to_owned())))
+}
+
+/// A configuration that has lost its drives is no wish for those that stand aside: an editor may have half written it.
+fn still_own(config: &Config, new: &Config) -> Result<(), Failure> {
+    let has_own = config.added.as_ref().is_some_and(|added| added.is_aside);
+    match &new.added {
+        Some(added) if has_own && !added.is_aside => Err(Failure::Input(format!(
+            "no drive: expected [[drives]] with line and drive; those of {} hold from the next start on",
+            added.file.display()
+        ))),
+        _ => Ok(()),
+    }
 }
 
 fn no_new_doubt(config: &Config, new: &Config) -> Result<(), Failure> {

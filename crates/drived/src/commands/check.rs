@@ -70,11 +70,11 @@ fn object(file: &Path, config: &Config) -> Value {
         "lines": config.lines.iter().map(line).collect::<Vec<_>>(),
         "doubts": config.doubts(),
         "state": config.doors.state.folder,
-        "added": config.added.as_ref().filter(|added| added.text.is_some()).map(|added| json!({
-            "file": added.file, "holds": !added.is_aside,
-        })),
         "timeout_stop_s": (config.shutdown + CLOSING).as_secs(),
     });
+    if let Some(added) = config.added.as_ref().filter(|added| added.text.is_some()) {
+        object["added"] = json!({ "file": added.file, "holds": !added.is_aside });
+    }
     for (key, meaning) in config.faces.iter().flat_map(|(_, face)| face.object()) {
         object[key] = meaning;
     }

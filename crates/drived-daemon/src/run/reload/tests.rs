@@ -26,25 +26,51 @@ fn text(drives: &[(&str, u8, &str)]) -> String {
     drives.iter().map(drive).fold(lines.to_owned(), |text, drive| text + &drive)
 }
 
-/// The route answers what the document of the API says.
+/// The routes answer what the document of the API says, and to whoever is no engineer nothing but how it stands.
 async fn answers_as_described(reloader: Reloader) {
-    let rights = Rights { engineer: true, ..Rights::NONE };
-    let caller = Caller::new("chief", "test", rights);
-    let router = drived_http::api::reload_router(reloader).layer(axum::Extension(caller));
+    let rights = Rights { engineer: true, view: true, ..Rights::NONE };
+    let as_who = |rights| {
+        let desk = super::super::setup::Desk::new(reloader.clone());
+        let all = drived_http::api::reload_router(reloader.clone());
+        let all = all.merge(drived_http::api::setup::setup_router(desk));
+        all.layer(axum::Extension(Caller::new("chief", "test", rights)))
+    };
+    let (router, operator) = (as_who(rights), as_who(Rights { engineer: false, ..Rights::ALL }));
     let document = drived_http::api::described();
-    for (path, status, kind) in [
-        ("/api/v1/reload?dry_run=true", 200, "application/json"),
-        ("/api/v1/reload", 200, "application/json"),
-        ("/api/v1/reload?dry_run=perhaps", 400, "application/problem+json"),
+    let (good, wrong) = ("application/json", "application/problem+json");
+    let drive = r#"{"name": "line", "line": "tcp://192.0.2.9:502", "drives": [{"address": 1, "family": "atv312", "name": "new"}]}"#;
+    for (method, path, body, status, kind) in [
+        ("post", "/api/v1/reload?dry_run=true", "", 200, good),
+        ("post", "/api/v1/reload", "", 200, good),
+        ("post", "/api/v1/reload?dry_run=perhaps", "", 400, wrong),
+        ("get", "/api/v1/setup", "", 200, good),
+        ("post", "/api/v1/setup/scan", r#"{"line": "/dev/ttyUSB0,fast"}"#, 422, wrong),
+        // The port of a line that is there.
+        ("post", "/api/v1/setup/scan", r#"{"line": "tcp://192.0.2.1:502"}"#, 422, wrong),
+        ("post", "/api/v1/setup/scan/cancel", "{}", 200, good),
+        // The configuration has drives of its own.
+        ("post", "/api/v1/setup/drives", drive, 422, wrong),
+        ("post", "/api/v1/setup/control", r#"{"drive": "one", "control": true}"#, 422, wrong),
     ] {
-        let request = axum::http::Request::post(path).body(axum::body::Body::empty()).unwrap();
+        let at = path.split('?').next().unwrap();
+        let request = || {
+            let request = axum::http::Request::builder().method(method.to_uppercase().as_str()).uri(path);
+            let request = request.header("content-type", "application/json");
+            request.body(axum::body::Body::from(body)).unwrap()
+        };
+        if method == "post" {
+            let refused = operator.clone().oneshot(request()).await.unwrap().status().as_u16();
+            assert_eq!(refused, 403, "{path}");
+        }
+        let request = request();
         let answer = router.clone().oneshot(request).await.unwrap();
         assert_eq!(
             (answer.status().as_u16(), answer.headers()["content-type"].to_str().unwrap()),
-            (status, kind)
+            (status, kind),
+            "{path}"
         );
         let body = answer.into_body().collect().await.unwrap().to_bytes();
-        let described = &document["paths"]["/api/v1/reload"]["post"]["responses"][status.to_string()];
+        let described = &document["paths"][at][method]["responses"][status.to_string()];
         let schema = &described["content"][kind]["schema"];
         assert!(schema.is_object(), "{path} {status} is not described");
         validate(&document, schema, &serde_json::from_slice(&body).unwrap(), path);

@@ -1,7 +1,7 @@
 //! What the doors answer themselves, held against the description of the API.
 
 use drived_doors::{
-    Role, TOKENS,
+    LINKS, Role, TOKENS,
     testing::{Asked, Rig, START},
 };
 
@@ -30,6 +30,24 @@ async fn login_and_logout_are_answered_as_the_document_says() {
     let schema =
         &document["paths"]["/api/v1/login"]["post"]["requestBody"]["content"]["application/json"]["schema"];
     validate(&document, schema, &serde_json::from_str(&right).unwrap(), "the body");
+}
+
+#[tokio::test]
+async fn a_link_and_the_session_by_its_code_are_answered_as_the_document_says() {
+    let rig = Rig::new("link-described");
+    let document = described();
+    let schema = |path: &str, status: &str, kind: &str| {
+        document["paths"][path]["post"]["responses"][status]["content"][kind]["schema"].clone()
+    };
+    let new = Asked { path: LINKS, body: r#"{"name":"anna","role":"view","days":3}"#, ..START };
+    let told: serde_json::Value = serde_json::from_str(&rig.ask_on_socket(&new).await.body).unwrap();
+    validate(&document, &schema(LINKS, "200", "application/json"), &told, LINKS);
+    let code = told["link"].as_str().unwrap().rsplit('/').next().unwrap();
+    let login = Asked { path: "/api/v1/login", body: &format!("{{\"code\":\"{code}\"}}"), ..START };
+    let told = serde_json::from_str(&rig.ask(&login).await.body).unwrap();
+    validate(&document, &schema("/api/v1/login", "200", "application/json"), &told, "a code");
+    let refused = serde_json::from_str(&rig.ask(&new).await.body).unwrap();
+    validate(&document, &schema(LINKS, "403", "application/problem+json"), &refused, LINKS);
 }
 
 #[tokio::test]

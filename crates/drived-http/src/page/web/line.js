@@ -18,7 +18,8 @@ export function lines(root) {
   const body = el('tbody');
   const list = table('', [t('line_name'), t('port'), [t('utilisation'), 'right'], [t('cycle'), 'right'], [t('worst_stop'), 'right'], [t('exchanges'), 'right'], [t('errors'), 'right']], []);
   list.tBodies[0].replaceWith(body);
-  root.append(el('h1', { tabindex: -1 }, t('lines')), el('section.panel', {}, el('div.wide', {}, list)));
+  root.append(el('h1', { tabindex: -1 }, t('lines')), el('section.panel', {}, el('div.wide', {}, list)),
+    el('p', { hidden: plant.daemon.demo }, el('a.button', { href: '#/setup' }, t('setup'))));
   const update = () => {
     const focused = document.activeElement?.textContent;
     const had = body.contains(document.activeElement);

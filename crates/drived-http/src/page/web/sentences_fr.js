@@ -5,6 +5,12 @@ import { FAULTS_FR } from './faults_fr.js';
 
 /** Whole sentences, and the phrases that stand in others. */
 export const SENTENCES_FR = {
+  'the history begins: nothing is known of before': 'l’historique commence : rien n’est connu d’avant',
+  'the daemon began': 'le service a commencé',
+  'the daemon ended as it should': 'le service a pris fin comme il se doit',
+  'the run before had ended as it should': 'le précédent avait pris fin comme il se doit',
+  'the run before ended without a word: it was killed, power was cut, or its end could not be written': 'le précédent a cessé sans un mot : tué, privé de courant, ou sa fin n’a pu être écrite',
+  'the configuration was read again, or too much happened at once: what was told just before may be missing here': 'la configuration a été relue, ou trop de choses sont arrivées à la fois : ce qui fut dit juste avant peut manquer ici',
   // Why a command is refused.
   'the drive is only read: its settings say control = false': 'le variateur est seulement lu : sa configuration indique control = false',
   'the drive does not answer': 'le variateur ne répond pas',
@@ -245,6 +251,13 @@ export function useWords(word) {
 
 // Longer patterns stand before those that would take a part of them.
 const PATTERNS = [
+  [/^this is the port of line "(.+)", whose drives are asked there already: a scan would disturb them$/, line => `ce port est celui de la ligne « ${line} », dont les variateurs y sont déjà interrogés : une recherche les gênerait`],
+  [/^another scan is under way: give it up first$/, () => 'une autre recherche est en cours : abandonnez-la d’abord'],
+  [/^this port is being scanned: wait for it, or give the scan up$/, () => 'ce port est en cours de recherche : attendez-en la fin, ou abandonnez-la'],
+  [/^(.+) has a run command of this daemon, or a stop that is not confirmed: it could not be stopped from here any more\. Stop it first$/, drive => `${drive} a un ordre de marche de ce service, ou un arrêt non confirmé : on ne pourrait plus l’arrêter d’ici. Arrêtez-le d’abord`],
+  [/^somebody else asks on this line: (\d+) requests in (.+?)\. This scan disturbs him, and he it: end his asking first, then scan again$/, (count, time) => `quelqu’un d’autre interroge cette ligne : ${count} requêtes en ${number(time)}. Cette recherche le gêne, et lui la gêne : mettez fin à ses questions, puis cherchez de nouveau`],
+  [/^there is no serial port (.+?)(?:: present: (.+))?$/, (port, there) => `il n’y a pas de port série ${port}${there ? ` ; présents : ${there}` : ''}`],
+  [/^the files have changed since they were read, and by them (.+): drived reload first$/, what => `les fichiers ont changé depuis leur lecture, et selon eux ${what} : d’abord drived reload`],
   [/^after ([\d.]+) s the drive says (.+), ([\d.]+) s ago$/, (after, status, ago) => `après ${number(after)} s le variateur indique ${state(status)}, il y a ${number(ago)} s`],
   [/^the drive has said nothing for ([\d.]+) s$/, time => `le variateur n’a rien dit pendant ${number(time)} s`],
   [/^the drive was last seen (.+), ([\d.]+) s ago$/, (status, ago) => `vu pour la dernière fois ${state(status)}, il y a ${number(ago)} s`],

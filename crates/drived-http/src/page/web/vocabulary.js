@@ -15,6 +15,13 @@ const WORDS = {
   fault_reaction: ['Fault reaction', 'Réaction au défaut'],
   fault: ['Fault', 'En défaut'],
   unknown: ['Unknown', 'État inconnu'],
+  // Motors.
+  driven: ['driven', 'entraîné'],
+  braking: ['braking', 'freinage'],
+  held_by_injection: ['held by injection', 'tenu par injection'],
+  'output_off,_the_shaft_may_coast': ['output off, the shaft may coast', 'sortie coupée, l’arbre peut encore tourner'],
+  at_rest: ['at rest', 'à l’arrêt'],
+  not_known: ['not known', 'inconnu'],
   // Links.
   connecting: ['Connecting', 'Connexion'],
   connected: ['Connected', 'Raccordé'],
