@@ -10,6 +10,8 @@ use std::{
 };
 
 use crc::{CRC_16_MODBUS, Crc};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 pub use self::table::{Configured, Kind, Known, Named, Table, Told, topic_id};
 use crate::{
@@ -22,6 +24,29 @@ pub const PLACES: usize = 496;
 
 /// The file of the state folder.
 const FILE: &str = "names.json";
+/// What only a daemon writes there that has written that file before: where one of them is and that file is not, it was lost.
+const WRITTEN_LATER: [&str; 3] = ["alarms.json", "history.sqlite", "webhooks.json"];
+
+/// What something is known as, whatever it is called at the moment.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct KnownAs {
+    /// The same for as long as it is not forgotten: the name that it had first, or one like it. Sparkplug and the metrics know it by this.
+    #[serde(default)]
+    pub id: String,
+    /// The same in letters, digits, `-` and `_`: in topics of MQTT, and to Home Assistant.
+    #[serde(default)]
+    pub short_name: String,
+    /// The number of a drive, from 0, by which it stands in the virtual unit of a gateway; absent where it has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slot: Option<u16>,
+}
+
+impl KnownAs {
+    /// What follows from a name alone.
+    pub fn of_name(name: &str) -> Self {
+        Self { id: name.to_owned(), short_name: topic_id(name), slot: None }
+    }
+}
 
 /// What there is by these lines and groups, in the order of the configuration.
 pub fn configured(lines: &[LinePart], groups: &[Group]) -> Configured {
@@ -52,11 +77,13 @@ struct Inner {
     table: Option<Table>,
     /// The topics of meanwhile: those that follow from the names.
     stopgap: Table,
+    /// Why what is kept cannot be read.
+    problem: Option<String>,
 }
 
 impl Default for Inner {
     fn default() -> Self {
-        Self { file: None, table: Some(Table::default()), stopgap: Table::default() }
+        Self { file: None, table: Some(Table::default()), stopgap: Table::default(), problem: None }
     }
 }
 
@@ -74,7 +101,7 @@ impl Names {
     /// What is kept cannot be read, or what has changed cannot be kept: in words. It holds then in this program alone.
     pub fn take_up(&self, there: &Configured) -> Result<Told, String> {
         let mut inner = self.lock();
-        let Inner { file, table, stopgap } = &mut *inner;
+        let Inner { file, table, stopgap, problem } = &mut *inner;
         *stopgap = Table::default();
         stopgap.take_up(there);
         let Some(file) = file else { return Ok(table.get_or_insert_default().take_up(there)) };
@@ -87,6 +114,7 @@ impl Names {
                 now
             }),
         };
+        *problem = kept.as_ref().err().filter(|_| table.is_none()).cloned();
         kept.map(|(_, told)| told)
     }
 
@@ -100,12 +128,35 @@ impl Names {
         self.slots().map(|slots| revision(&slots))
     }
 
-    /// The topic of something, by its name.
-    pub fn topic(&self, kind: Kind, name: &str) -> String {
+    /// Why nobody has a number, in words; `None`: everybody has what he had.
+    pub fn problem(&self) -> Option<String> {
+        self.lock().problem.clone()
+    }
+
+    /// What something is known as, by its name.
+    pub fn known_as(&self, kind: Kind, name: &str) -> KnownAs {
         let inner = self.lock();
         let table = inner.table.as_ref().unwrap_or(&inner.stopgap);
         let known = table.of(kind).iter().find(|known| known.name == name && !known.gone);
-        known.map_or_else(|| topic_id(name), |known| known.topic.clone())
+        // The numbers of meanwhile are nobody's.
+        let slot = |known: &Known| known.slot.filter(|_| inner.table.is_some());
+        known.map_or_else(
+            || KnownAs::of_name(name),
+            |known| KnownAs { id: known.id.clone(), short_name: known.topic.clone(), slot: slot(known) },
+        )
+    }
+
+    /// The topic of something, by its name.
+    pub fn topic(&self, kind: Kind, name: &str) -> String {
+        self.known_as(kind, name).short_name
+    }
+
+    /// The name of something, by its id.
+    pub fn name_of(&self, kind: Kind, id: &str) -> Option<String> {
+        let inner = self.lock();
+        let table = inner.table.as_ref().unwrap_or(&inner.stopgap);
+        let known = table.of(kind).iter().find(|known| known.id == id && !known.gone);
+        known.map(|known| known.name.clone())
     }
 
     /// Whether something of the configuration has this topic.
@@ -137,10 +188,10 @@ pub fn place(folder: &Path) -> PathBuf {
     folder.join(FILE)
 }
 
-/// What is kept in a file; nothing where there is none.
+/// What is kept in a file; nothing before the first start.
 ///
 /// # Errors
-/// It cannot be read, or is damaged: in words, with what to do.
+/// It cannot be read, is damaged, or is not there though what a daemon writes after it is: in words, with what to do.
 pub fn read(file: &Kept) -> Result<Table, String> {
     let read = match file.read() {
         Ok(Some((text, _))) => {
@@ -149,12 +200,19 @@ pub fn read(file: &Kept) -> Result<Table, String> {
                 table
             })
         }
-        Ok(None) => Ok(Table::default()),
+        Ok(None) => {
+            match WRITTEN_LATER.into_iter().find(|later| file.path().with_file_name(later).exists()) {
+                None => Ok(Table::default()),
+                Some(later) => Err(io::Error::other(format!(
+                    "it is lost: {later} beside it is of an earlier start, which had it"
+                ))),
+            }
+        }
         Err(error) => Err(error),
     };
     let sound = read.and_then(|table| match table.is_sound() {
         true => Ok(table),
-        false => Err(io::Error::other("a number, a name or a topic stands there twice")),
+        false => Err(io::Error::other("a number, a name, an id or a topic stands there twice")),
     });
     sound.map_err(|error| {
         format!(
@@ -175,15 +233,19 @@ pub fn changed<T>(
     let wrong = |error: io::Error| format!("{}: {error}", file.path().display());
     // Two at once would each forget what the other has written.
     let _lock = file.lock().map_err(wrong)?;
-    let before = read(file)?;
-    let mut table = before.clone();
+    let mut table = read(file)?;
+    let before = file.path().exists().then(|| table.clone());
     let done = change(&mut table)?;
     table.drives.sort_by_key(|known| known.slot);
-    if table != before {
-        let text = serde_json::to_vec_pretty(&table).map_err(|error| wrong(error.into()))?;
-        file.replace(&text, Readers::Owner).map_err(wrong)?;
+    // Also where nothing is known yet: a later start sees by the file that there was this one.
+    if before.as_ref() != Some(&table) {
+        write(file, &table).map_err(wrong)?;
     }
     Ok((table, done))
+}
+
+fn write(file: &Kept, table: &Table) -> io::Result<()> {
+    file.replace(&serde_json::to_vec_pretty(table)?, Readers::Owner)
 }
 
 /// Puts what is kept aside, where it can be looked at, and numbers what there is anew. Gives where it is now.
@@ -191,12 +253,17 @@ pub fn changed<T>(
 /// # Errors
 /// The folder cannot be written: in words.
 pub fn renewed(file: &Kept, there: &Configured) -> Result<(Table, Option<PathBuf>), String> {
+    let wrong = |error: io::Error| format!("{}: {error}", file.path().display());
+    let _lock = file.lock().map_err(wrong)?;
     let aside = file.beside(".old");
     let moved = file.rename(&aside).or_else(|error| match error.kind() {
         io::ErrorKind::NotFound => Ok(false),
-        _ => Err(format!("{}: {error}", file.path().display())),
+        _ => Err(wrong(error)),
     })?;
-    let (table, _) = changed(file, |table| Ok(table.take_up(there)))?;
+    let mut table = Table::default();
+    table.take_up(there);
+    table.drives.sort_by_key(|known| known.slot);
+    write(file, &table).map_err(wrong)?;
     Ok((table, moved.then(|| aside.path().to_owned())))
 }
 

@@ -175,6 +175,8 @@ impl Peer {
 /// The checks, and what lies behind them.
 pub(super) struct Gate {
     pub(super) router: Router,
+    /// The addresses of the router that stop, as it has them: `/api/v1/drives/{name}/stop`.
+    pub(super) stops: Vec<&'static str>,
     pub(super) tokens: Option<Arc<Tokens>>,
     pub(super) audit: Audit,
     pub(super) sessions: Sessions,
@@ -279,7 +281,7 @@ impl Gate {
             return Err(Refusal::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, why));
         }
         let path = parts.uri.path().to_owned();
-        let stops = parts.method == Method::POST && is_stop(&path);
+        let stops = parts.method == Method::POST && self.stops.iter().any(|stop| fits(stop, &path));
         if asking.is_for_stops() && !stops {
             let why = "all places are taken: this one is for stops";
             return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, why).after(Duration::from_secs(1)));
@@ -643,11 +645,10 @@ impl From<TokenError> for Unlet {
     }
 }
 
-/// Whether a path is that of a stop.
-fn is_stop(path: &str) -> bool {
-    let Some(path) = path.strip_prefix("/api/v1/") else { return false };
-    matches!(path, "stop" | "selected/stop")
-        || (path.starts_with("drives/") || path.starts_with("groups/")) && path.ends_with("/stop")
+/// Whether a path is one of those that a router has at this address: what stands in braces is any level.
+fn fits(address: &str, path: &str) -> bool {
+    let fits = |(level, said): (&str, &str)| level == said || level.starts_with('{') && !said.is_empty();
+    address.split('/').count() == path.split('/').count() && address.split('/').zip(path.split('/')).all(fits)
 }
 
 /// The body of a request, as far as it may go.

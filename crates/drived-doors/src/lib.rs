@@ -163,9 +163,9 @@ impl Prepared {
         self.audit.clone()
     }
 
-    /// Opens the doors before a router. An address of the HTTP server that is taken, or not there yet, is tried again and
+    /// Opens the doors before a router, of which these addresses stop: what is asked there has a way of its own. An address of the HTTP server that is taken, or not there yet, is tried again and
     /// again, and told once.
-    pub fn open(self, router: Router) -> Doors {
+    pub fn open(self, router: Router, stops: Vec<&'static str>) -> Doors {
         let (ended, end) = watch::channel(false);
         let (here, gone) = mpsc::channel(1);
         let (listens, listening) = watch::channel(self.http.is_none());
@@ -175,6 +175,7 @@ impl Prepared {
             (Codes::default(), Arc::<OnceLock<String>>::default(), tokens.is_some());
         let gate = Gate {
             router,
+            stops,
             tokens,
             audit: audit.clone(),
             sessions,

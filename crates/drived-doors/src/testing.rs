@@ -19,6 +19,10 @@ use tokio::{
 
 use crate::{config::DoorsConfig, gate::Peer, *};
 
+/// The addresses that stop, as the API has them.
+const STOPS: [&str; 4] =
+    ["/api/v1/stop", "/api/v1/selected/stop", "/api/v1/drives/{name}/stop", "/api/v1/groups/{name}/stop"];
+
 /// What stands behind the doors here: it says who came, and streams without end.
 fn router() -> Router {
     async fn who(Extension(caller): Extension<Caller>) -> String {
@@ -74,6 +78,7 @@ impl Rig {
         let audit = Audit::open(&folder.file("audit")).unwrap();
         let gate = Arc::new(Gate {
             router: router(),
+            stops: STOPS.to_vec(),
             tokens,
             audit,
             sessions,

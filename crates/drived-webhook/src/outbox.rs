@@ -63,6 +63,8 @@ pub(crate) struct Outbox {
     waiting: VecDeque<Message>,
     /// It is on its way.
     posted: Option<Message>,
+    /// What is on its way need not be tried again: nobody is to be told of it any more.
+    is_recalled: bool,
     told: Told,
     /// Messages that there was no room for since the last that was taken.
     lost: u64,
@@ -70,15 +72,19 @@ pub(crate) struct Outbox {
 
 impl Outbox {
     pub(crate) const fn new(host: String, wanted: Wanted, told: Told) -> Self {
-        Self { host, wanted, waiting: VecDeque::new(), posted: None, told, lost: 0 }
+        Self { host, wanted, waiting: VecDeque::new(), posted: None, is_recalled: false, told, lost: 0 }
     }
 
-    /// All alarms that are not over, as they are: what it has been told already is not told again, and what it was told of and is not there
-    /// any more is over.
+    /// All alarms that are not over, as they are: what it has been told already is not told again, and what it was told of, or what still
+    /// waits for it, and is not there any more is over.
     pub(crate) fn offer_all(&mut self, all: Vec<AlarmView>, revision: u64, now: Instant) -> u64 {
+        let under_way = self.posted.iter().chain(&self.waiting).map(|message| &message.view);
+        // The newest of each.
+        let known: BTreeMap<u64, &AlarmView> =
+            self.told.values().chain(under_way).map(|view| (view.alarm.id, view)).collect();
         let is_there = |id: u64| all.iter().any(|view| view.alarm.id == id);
-        let mut over: Vec<AlarmView> =
-            self.told.values().filter(|view| !is_there(view.alarm.id)).cloned().collect();
+        let over = known.into_iter().filter(|(id, _)| !is_there(*id));
+        let mut over: Vec<AlarmView> = over.map(|(_, view)| view.clone()).collect();
         over.iter_mut().for_each(|view| view.state = AlarmState::Over);
         over.into_iter().chain(all).map(|view| self.offer(view, revision, now)).sum()
     }
@@ -87,22 +93,30 @@ impl Outbox {
     pub(crate) fn offer(&mut self, view: AlarmView, revision: u64, now: Instant) -> u64 {
         let id = view.alarm.id;
         let at = self.waiting.iter().position(|message| message.view.alarm.id == id);
+        let is_posted = self.posted.as_ref().is_some_and(|message| message.view.alarm.id == id);
         // Its cause is told for it.
         if view.state == AlarmState::Suppressed {
             _ = at.and_then(|at| self.waiting.remove(at));
+            self.is_recalled |= is_posted;
             return 0;
         }
-        let is_posted = self.posted.as_ref().is_some_and(|message| message.view.alarm.id == id);
         let is_unheard_of = at.is_none() && !is_posted && !self.told.contains_key(&id);
         if view.state == AlarmState::Over && is_unheard_of || view.severity > self.wanted.severity {
             return 0;
         }
         if self.wanted.only_coming && view.state != AlarmState::Unacknowledged {
             // Nobody is called for what somebody has taken note of meanwhile.
-            _ = at.filter(|_| !view.state.waits()).and_then(|at| self.waiting.remove(at));
-            _ = (view.state == AlarmState::Over).then(|| self.told.remove(&id));
+            if !view.state.waits() {
+                _ = at.and_then(|at| self.waiting.remove(at));
+                self.is_recalled |= is_posted;
+            }
+            if view.state == AlarmState::Over {
+                self.told.remove(&id);
+                _ = self.posted.as_mut().filter(|_| is_posted).map(|message| message.view.state = view.state);
+            }
             return 0;
         }
+        self.is_recalled &= !is_posted;
         let stage = stage_of(&view);
         let message_id = self.id_of(id, revision);
         if let Some(before) = at.and_then(|at| self.waiting.get_mut(at)) {
@@ -131,6 +145,7 @@ impl Outbox {
         match urgent.or_else(|| self.waiting.iter().position(ready)).and_then(|at| self.waiting.remove(at)) {
             Some(message) => {
                 self.posted = Some(message.clone());
+                self.is_recalled = false;
                 Next::Post(Box::new(message), self.lost)
             }
             None => self.waiting.iter().map(|message| message.ready_at).min().map_or(Next::Nothing, Next::At),
@@ -164,6 +179,7 @@ impl Outbox {
         let id = message.view.alarm.id;
         match self.waiting.iter_mut().find(|newer| newer.view.alarm.id == id) {
             Some(newer) => newer.skipped += message.skipped + 1,
+            None if self.is_recalled => {}
             None => self.waiting.push_front(message),
         }
     }
@@ -307,6 +323,52 @@ mod tests {
         worst.offer(warning, 1, Instant::now());
         worst.offer(view(2, "unacknowledged"), 2, Instant::now());
         assert_eq!(told(&mut worst), known(&[(2, "unacknowledged", 0)]));
+    }
+
+    #[test]
+    fn what_ended_while_the_receiver_was_away_is_told_as_over_and_never_as_standing() {
+        // So many changes came meanwhile that they were not told one by one: what there is is offered whole.
+        for is_on_its_way in [false, true] {
+            let mut outbox = outbox(ALL);
+            outbox.offer(view(1, "unacknowledged"), 1, Instant::now());
+            outbox.offer(view(2, "unacknowledged"), 2, Instant::now());
+            if is_on_its_way {
+                next(&mut outbox);
+            }
+            outbox.offer_all(vec![view(2, "unacknowledged")], 9, Instant::now());
+            outbox.not_taken();
+            let mut told = told(&mut outbox);
+            told.sort();
+            assert_eq!(told, known(&[(1, "over", 1), (2, "unacknowledged", 0)]), "{is_on_its_way}");
+            assert!(!outbox.told().contains_key(&1));
+        }
+    }
+
+    #[test]
+    fn who_is_only_called_is_not_called_again_for_what_somebody_has_seen_while_the_call_failed() {
+        let mut outbox = outbox(Wanted { only_coming: true, ..ALL });
+        for seen in ["acknowledged", "over", "suppressed"] {
+            outbox.offer(view(1, "unacknowledged"), 1, Instant::now());
+            next(&mut outbox);
+            outbox.offer(view(1, seen), 2, Instant::now());
+            outbox.not_taken();
+            assert_eq!(told(&mut outbox), [], "{seen}");
+            assert_eq!(*outbox.told(), Told::new());
+        }
+        // One whose cause went away before it is its own again, and so is the one that nobody has seen.
+        outbox.offer(view(1, "unacknowledged"), 1, Instant::now());
+        next(&mut outbox);
+        outbox.offer(view(1, "suppressed"), 2, Instant::now());
+        outbox.offer(view(1, "unacknowledged"), 3, Instant::now());
+        outbox.not_taken();
+        assert_eq!(told(&mut outbox), known(&[(1, "unacknowledged", 0)]));
+        // What the call was taken for is over: nothing is kept of it.
+        let mut outbox = self::outbox(Wanted { only_coming: true, ..ALL });
+        outbox.offer(view(2, "unacknowledged"), 4, Instant::now());
+        next(&mut outbox);
+        outbox.offer(view(2, "over"), 5, Instant::now());
+        outbox.taken(0);
+        assert_eq!(*outbox.told(), Told::new());
     }
 
     #[test]

@@ -65,7 +65,7 @@ fn every_face_tells(state: &StateView) {
 
 /// The rules for a metrics store say the same words, and wake nobody for what is no trouble.
 fn the_rules_tell(kind: ConcernKind) {
-    let rule = format!("summary: \"{{{{ $labels.drive }}}}: {}\"", kind.words());
+    let rule = format!("summary: \"{{{{ $labels.name }}}}: {}\"", kind.words());
     let has_rule = metrics::ALERTS.contains(&format!("drived_alarms{{alarm=\"{}\"", kind.word()));
     let is_alarm = AlarmKind::Drive(kind).severity().is_trouble();
     assert_eq!(metrics::ALERTS.contains(&rule), is_alarm, "{rule}");

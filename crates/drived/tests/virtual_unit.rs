@@ -200,6 +200,12 @@ fn a_host_is_made_of_the_template_and_found_by_prometheus() {
     assert!(checked.code == Some(0) && checked.out.contains("plant/pumps-north"), "{checked:?}");
     let found = run(&["export", "file-sd", "--config", &at("drives.toml"), "--host", "pumps-north"]);
     let found = found.assert_done();
+    // With a site, which stands in every topic and label.
+    let south = run(&["export", "host", "--host", "fans", "--site", "south"]);
+    assert!(south.assert_done().contains("base = \"south/fans\""), "{south:?}");
+    let labelled =
+        run(&["export", "file-sd", "--config", &at("drives.toml"), "--host", "fans", "--site", "south"]);
+    assert!(labelled.assert_done().contains("\"site\": \"south\""), "{labelled:?}");
     // https://prometheus.io/docs/prometheus/latest/configuration/configuration/#file_sd_config
     let expected = serde_json::json!([{
         "targets": ["pumps-north:7580"],

@@ -15,6 +15,7 @@ use tokio::time::Instant;
 use super::{
     Face,
     discovery::{self, Discovered},
+    parts::TOPICS,
     topics::Standing,
 };
 use crate::broker::{Arrived, Qos, Subscription, Wanted, config::Discovery};
@@ -138,7 +139,7 @@ impl Gone {
         for id in due {
             self.rest.remove(&id);
             if !has_drive(face, &id) {
-                for what in ["state", "measurements", "fault", "alarms", "last_command", "availability"] {
+                for what in TOPICS.into_iter().chain(["alarms", "last_command", "availability"]) {
                     face.tell_for_good(face.topics.drive_of(&id, what), "");
                 }
             }

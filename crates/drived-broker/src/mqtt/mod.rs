@@ -8,6 +8,7 @@ mod commanding;
 mod discovery;
 mod gone;
 mod last;
+mod parts;
 mod telling;
 #[cfg(test)]
 mod tests;

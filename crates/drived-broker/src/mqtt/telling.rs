@@ -1,7 +1,8 @@
 //! What is told: each drive by a task of its own, from its watch, as the API has it.
 //!
 //! What a person has to know at once (state, link, fault, stop) is told at once; values that change all the time at most
-//! once in an interval, and only those topics in which one has changed; everything at each heartbeat, though nothing has changed.
+//! once in an interval, and only those topics in which one has moved by more than it means; everything at each heartbeat, though nothing
+//! has changed.
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
@@ -10,13 +11,20 @@ use drive_fleet::{DriveHandle, Event, EventKind, Freshness, Link, Snapshot};
 use serde_json::{Map, Value, json};
 use tokio::time::{Instant, sleep_until};
 
-use super::{Face, discovery::Discovered};
+use super::{
+    Face,
+    discovery::Discovered,
+    parts::{ABOUT, MEASUREMENTS, News, TOPICS, news, parts_of},
+};
 use crate::broker::{Kept, Message};
-use drived_plant::plant::views::{DriveView, Gist, LineView};
+use drived_plant::plant::views::{Gist, LineView};
 use drived_words::json::{line, unix};
 
 /// For how long news are of interest to a broker that was away.
 const NEWS_FOR: Duration = Duration::from_secs(600);
+
+/// After so many intervals what has moved by less than it means is told too, so that everybody has what a value came to rest at.
+const LITTLE: u32 = 10;
 
 /// What is told at once.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -69,17 +77,15 @@ impl Teller {
             let (head, gist) = (Head::of(&snapshot, now), Gist::of(&snapshot, now));
             let due = match &told {
                 Some(last) if again || last.head != head => now,
-                Some(last) if last.gist != gist => (last.at + interval).min(last.whole_at + heartbeat),
-                Some(last) => last.whole_at + heartbeat,
+                Some(last) if last.gist != gist => (last.looked_at + interval).min(last.due(heartbeat)),
+                Some(last) => last.due(heartbeat),
                 None => now,
             };
             let due = if due <= now {
-                // Of what was told in this heartbeat only what has changed is told again.
-                let before = told.filter(|last| !again && now < last.whole_at + heartbeat);
-                let told_now = self.tell(&snapshot, again, before.as_ref().map(|last| &last.values));
-                let whole_at = before.map_or(now, |last| last.whole_at);
-                told = Some(Told { head, gist, at: now, whole_at, values: told_now });
-                whole_at + heartbeat
+                let told_now = self.tell(head, gist, again, told.take());
+                let due = told_now.due(heartbeat);
+                told = Some(told_now);
+                due
             } else {
                 due
             };
@@ -99,77 +105,75 @@ impl Teller {
         }
     }
 
-    /// Tells all of it, or what is not as it was before. Gives what it is now.
-    fn tell(&self, snapshot: &Snapshot, again: bool, before: Option<&Values>) -> Values {
-        let (face, name) = (&self.face, self.drive.name());
-        let reachable = if snapshot.link == Link::Connected { "online" } else { "offline" };
-        let Parts { state, measurements, fault } = Parts::of(&DriveView::of(&self.line, &self.drive));
+    /// Tells all of it where it was not told in this heartbeat, and else what is news: what a person has to know at once, what has moved
+    /// by more than it means once in its interval, and what has moved by less after some of them.
+    fn tell(&self, head: Head, gist: Gist, again: bool, before: Option<Told>) -> Told {
+        let (face, name, now) = (&self.face, self.drive.name(), Instant::now());
         self.discovered.tell(face, &self.drive, again);
-        let parts = [state, measurements, fault].map(Value::Object);
-        let values = (reachable, parts.clone().map(ageless));
-        for (at, (what, part)) in ["state", "measurements", "fault"].into_iter().zip(parts).enumerate() {
-            if before.is_none_or(|(_, before)| before[at] != values.1[at]) {
-                face.tell(face.topics.drive(name, what), part.to_string());
-            }
-        }
-        if before.is_none_or(|(before, _)| *before != reachable) {
+        let is_urgent = before.as_ref().is_none_or(|before| before.head != head);
+        let whole =
+            again || before.as_ref().is_none_or(|before| now >= before.whole_at + face.config.heartbeat);
+        let reachable = if head.link == Link::Connected { "online" } else { "offline" };
+        // It does not expire.
+        if again || before.as_ref().is_none_or(|before| before.head.link != head.link) {
             face.tell_for_good(face.topics.drive(name, "availability"), reachable);
         }
-        values
+        let whole_at = before.as_ref().filter(|_| !whole).map_or(now, |before| before.whole_at);
+        let mut parts_before = before.map(|before| before.parts.map(Some)).unwrap_or_default();
+        let (mut pending, rows) = (None, self.drive.capabilities().rows);
+        let mut place = 0;
+        let parts = parts_of(&face.plant.view_of(&self.line, &self.drive)).map(|value| {
+            let (at, last) = (place, parts_before[place].take());
+            place += 1;
+            let news = last.as_ref().map_or(News::Something, |(last, _)| news(at, last, &value, rows));
+            let pace = if at == MEASUREMENTS { face.config.measurements } else { face.config.interval };
+            let wait = match news {
+                // What a drive is does not expire, and is not told again.
+                _ if whole && (again || at != ABOUT) => Duration::ZERO,
+                News::Nothing => Duration::MAX,
+                _ if is_urgent => Duration::ZERO,
+                News::Something => pace,
+                News::Little => pace * LITTLE,
+            };
+            let due = last.as_ref().map_or(Some(now), |(_, told_at)| told_at.checked_add(wait));
+            match (due, last) {
+                (Some(due), last) if due <= now || last.is_none() => {
+                    let topic = face.topics.drive(name, TOPICS[at]);
+                    match at == ABOUT {
+                        true => face.tell_for_good(topic, value.to_string()),
+                        false => face.tell(topic, value.to_string()),
+                    }
+                    (value, now)
+                }
+                (due, last) => {
+                    pending = pending.into_iter().chain(due).min();
+                    last.unwrap_or((value, now))
+                }
+            }
+        });
+        Told { head, gist, looked_at: now, whole_at, pending, parts }
     }
 }
-
-/// Whether a drive answers, and its state, measurements and fault without their ages.
-type Values = (&'static str, [Value; 3]);
 
 /// What was told of a drive.
 struct Told {
     head: Head,
+    /// When it was looked at last whether something is to be told, and what it was then.
+    looked_at: Instant,
     gist: Gist,
-    /// When anything was told last, and when everything.
-    at: Instant,
+    /// When everything was told last.
     whole_at: Instant,
-    values: Values,
+    /// When something is to be told that has waited for its time.
+    pending: Option<Instant>,
+    /// Each part as it was told last, and when.
+    parts: [(Value, Instant); 4],
 }
 
-/// The same without what changes as time goes by.
-fn ageless(mut value: Value) -> Value {
-    match &mut value {
-        Value::Object(members) => {
-            members.retain(|key, _| key != "age_ms" && key != "time_unix_ms");
-            members.values_mut().for_each(|member| *member = ageless(member.take()));
-        }
-        Value::Array(all) => all.iter_mut().for_each(|one| *one = ageless(one.take())),
-        _ => {}
-    }
-    value
-}
-
-/// A drive as it is told, by topic.
-struct Parts {
-    state: Map<String, Value>,
-    measurements: Map<String, Value>,
-    fault: Map<String, Value>,
-}
-
-impl Parts {
-    fn of(view: &DriveView) -> Self {
-        let now = Value::from(unix(Instant::now()));
-        let object = |value| match value {
-            Some(Value::Object(object)) => object,
-            _ => Map::new(),
-        };
-        let mut state = object(serde_json::to_value(view).ok());
-        let mut measurements = object(state.remove("measurements"));
-        let fault = state.remove("fault");
-        let present = Value::from(fault.is_some());
-        let mut fault = object(fault);
-        fault.insert("present".to_owned(), present);
-        fault.insert("quality".to_owned(), state["status"]["quality"].clone());
-        for part in [&mut state, &mut measurements, &mut fault] {
-            part.insert("time_unix_ms".to_owned(), now.clone());
-        }
-        Self { state, measurements, fault }
+impl Told {
+    /// When something is to be told though nothing changes.
+    fn due(&self, heartbeat: Duration) -> Instant {
+        let whole = self.whole_at + heartbeat;
+        self.pending.map_or(whole, |pending| pending.min(whole))
     }
 }
 

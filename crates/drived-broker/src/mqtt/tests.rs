@@ -29,6 +29,7 @@ fn config() -> MqttConfig {
         base: "plant/north".to_owned(),
         heartbeat: Duration::from_secs(30),
         interval: Duration::from_secs(1),
+        measurements: Duration::from_secs(10),
         commands: true,
         commanders: BTreeMap::new(),
         discovery: Discovery::Device,
@@ -638,7 +639,7 @@ async fn a_drive_that_leaves_is_taken_back() {
     let topics = |broker: &TestBroker| -> Vec<String> {
         broker.retained().into_keys().filter(|topic| topic.contains("pump_2")).collect()
     };
-    assert_eq!(topics(&bench.broker).len(), 6, "{:?}", topics(&bench.broker));
+    assert_eq!(topics(&bench.broker).len(), 7, "{:?}", topics(&bench.broker));
     let _ = bench.plant.plant.fleet().remove(&["pump 2"], Duration::from_secs(30)).await;
     a_while().await;
     assert_eq!(topics(&bench.broker), Vec::<String>::new());

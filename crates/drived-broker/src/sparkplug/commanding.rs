@@ -20,6 +20,7 @@ use crate::{
     broker::config::SparkplugConfig,
     desk::{AlarmMessage, Answer, Answers, Desk, Message, Refusal},
 };
+use drived_config::names::Kind;
 use drived_doors::{Caller, Rights, Role, audit::Audit};
 use drived_plant::plant::{
     Plant,
@@ -34,6 +35,7 @@ const CALLER: &str = "sparkplug";
 /// What takes commands.
 pub(super) struct Commanding {
     desk: Desk<To>,
+    plant: Plant,
     caller: Caller,
     /// How old a command may be that does not say so itself.
     lifetime: Duration,
@@ -41,10 +43,10 @@ pub(super) struct Commanding {
     outcomes: mpsc::Sender<(Option<String>, Json)>,
 }
 
-/// The drive whose last command it is; `None`: it was about alarms.
+/// The device whose last command it is; `None`: it was about alarms.
 #[derive(Clone)]
 struct To {
-    drive: Option<String>,
+    device: Option<String>,
     outcomes: mpsc::Sender<(Option<String>, Json)>,
 }
 
@@ -59,7 +61,8 @@ impl Commanding {
         let rights = config.commands.map_or(Rights::NONE, Role::rights);
         let origin = format!("sparkplug {}", config.name.group);
         let caller = Caller::new(CALLER, origin, rights);
-        Self { desk: Desk::open(plant, audit, closing), caller, lifetime: config.lifetime, outcomes }
+        let desk = Desk::open(plant.clone(), audit, closing);
+        Self { desk, plant, caller, lifetime: config.lifetime, outcomes }
     }
 
     /// Takes what a host writes, one metric after the other. `is_alive`: the births have been told, so that the host can know
@@ -71,24 +74,26 @@ impl Commanding {
             let undated = || Refusal::malformed("its payload has no timestamp: its age is not known");
             let undated = timestamp.is_none().then(undated);
             let doubt = if is_retained { Some(Refusal::Retained) } else { unborn.or(undated) };
-            let Some(drive) = device.as_ref().map(|device| device.as_str().to_owned()) else {
+            let Some(device) = device.as_ref().map(|device| device.as_str().to_owned()) else {
                 self.handle_alarms(write, doubt, timestamp, arrived);
                 continue;
             };
+            // The drive that it is now; whom it does not know the desk refuses by what was said.
+            let drive = self.plant.name_of(Kind::Drive, &device).unwrap_or_else(|| device.clone());
             self.desk.take(Message {
                 needs_id: matches!(&write, Ok(write) if write.name == COMMAND),
                 doubt: read_only(&write).or(doubt),
                 said: said(write),
                 caller: self.caller.clone(),
                 pace_of: String::new(),
-                target: Some(Target::Drive(drive.clone())),
+                target: Some(Target::Drive(drive)),
                 arrived: arrived.at,
                 sent_unix_ms: timestamp,
                 lifetime: self.lifetime,
                 longest: None,
                 id: None,
                 what: format!("MQTT {}", arrived.topic),
-                answers: To { drive: Some(drive), outcomes: self.outcomes.clone() },
+                answers: To { device: Some(device), outcomes: self.outcomes.clone() },
             });
         }
     }
@@ -117,7 +122,7 @@ impl Commanding {
             arrived: arrived.at,
             sent_unix_ms,
             what: format!("MQTT {}", arrived.topic),
-            answers: To { drive: None, outcomes: self.outcomes.clone() },
+            answers: To { device: None, outcomes: self.outcomes.clone() },
         });
     }
 }
@@ -171,6 +176,6 @@ impl Answers for To {
         let last =
             json!({ "id": id, "outcome": outcome, "reason": reason, "text": text, "time_unix_ms": time });
         // Nobody waits for the face: an outcome that finds no room stands in the audit log.
-        let _ = self.outcomes.try_send((self.drive.clone(), last));
+        let _ = self.outcomes.try_send((self.device.clone(), last));
     }
 }

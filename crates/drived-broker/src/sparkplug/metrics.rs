@@ -20,9 +20,10 @@ const DAEMON: &[Row] = &[
     ("Daemon/Version", DataType::String, "/version"),
 ];
 
-/// What each of its lines has, below its name.
+/// What each of its lines has, below its id.
 #[rustfmt::skip]
 const LINE: &[Row] = &[
+    ("Name", DataType::String, "/name"),
     ("Link", DataType::String, "/link"),
     ("Utilisation", DataType::Double, "/utilisation_percent"),
     ("Worst Case Stop", DataType::UInt64, "/worst_case_stop_ms"),
@@ -122,6 +123,9 @@ const DRIVE: &[Row] = &[
     ("Control/LastCommand/Reason", DataType::String, "/last/reason"),
     ("Control/LastCommand/Text", DataType::String, "/last/text"),
     ("Control/LastCommand/Time", DataType::DateTime, "/last/time_unix_ms"),
+    ("Properties/Name", DataType::String, "/name"),
+    ("Properties/Short Name", DataType::String, "/short_name"),
+    ("Properties/Slot", DataType::Int32, "/slot"),
     ("Properties/Line", DataType::String, "/line"),
     ("Properties/Slave", DataType::Int32, "/slave"),
     ("Properties/Family", DataType::String, "/family"),
@@ -134,7 +138,7 @@ pub(super) fn of_a_drive() -> Vec<Definition> {
     DRIVE.iter().map(|&(name, data_type, _)| Definition::new(name, data_type)).collect()
 }
 
-/// The metrics of the daemon, of lines of these names, and of the alarms of these.
+/// The metrics of the daemon, of lines of these ids, and of the alarms of these.
 pub(super) fn of_the_node<'a>(
     lines: impl IntoIterator<Item = &'a String>,
     owners: impl IntoIterator<Item = &'a Owner>,
@@ -193,9 +197,9 @@ pub(super) fn read_alarms(
 
 /// What a line's object says.
 pub(super) fn read_line(line: &Json, now_unix_ms: u64) -> impl Iterator<Item = (String, Reading)> {
-    let name = line["name"].as_str().unwrap_or_default();
+    let id = line["id"].as_str().unwrap_or_default();
     LINE.iter().map(move |&(metric, data_type, pointer)| {
-        (below(name, metric), good(value(line, data_type, pointer), now_unix_ms))
+        (below(id, metric), good(value(line, data_type, pointer), now_unix_ms))
     })
 }
 

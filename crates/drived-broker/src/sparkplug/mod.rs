@@ -10,7 +10,7 @@ mod metrics;
 mod tests;
 
 use std::{
-    collections::{BTreeSet, HashMap},
+    collections::{BTreeMap, BTreeSet, HashMap},
     sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
@@ -30,10 +30,11 @@ use crate::{
     broker::{Arrived, Broker, Event, Goodbye, Kept, Message, Options, Qos, Subscription, Wanted, Will},
     mqtt,
 };
+use drived_config::names::Kind;
 use drived_doors::audit::Audit;
 use drived_plant::{
     counts::{Id, Samples},
-    plant::{Plant, alarms::Owner, views::DriveView},
+    plant::{Plant, alarms::Owner},
 };
 use drived_words::{failure::Failure, json::unix};
 
@@ -147,8 +148,8 @@ impl Prepared {
         let (leave, leaves) = oneshot::channel();
         let fleet_events = plant.fleet().events();
         let commanding = Commanding::new(&config, plant.clone(), audit, closes, outcomes);
-        let (drives, names) = Default::default();
-        let face = Face { plant, node, broker: broker.clone(), connection: None, commanding, drives, names };
+        let (drives, ids) = Default::default();
+        let face = Face { plant, node, broker: broker.clone(), connection: None, commanding, drives, ids };
         let task = tokio::spawn(face.run(events, number, told, fleet_events, leaves, interval));
         Sparkplug { broker, closing, leave, task }
     }
@@ -162,9 +163,10 @@ struct Face {
     /// The number of the connection.
     connection: Option<u64>,
     commanding: Commanding,
+    /// By their ids, which are those of the devices.
     drives: HashMap<String, Seen>,
-    /// The names of the lines and of the drives by which the metrics of the node are defined.
-    names: (BTreeSet<String>, BTreeSet<String>),
+    /// The ids of the lines and of the drives by which the metrics of the node are defined.
+    ids: (BTreeSet<String>, BTreeSet<String>),
 }
 
 /// A drive as it was told last.
@@ -283,9 +285,9 @@ impl Face {
         }
     }
 
-    /// Sets what became of a command, and says it before anything else becomes of it.
-    fn tell_outcome(&mut self, drive: &str, last: Json) {
-        if let Some(seen) = self.drives.get_mut(drive) {
+    /// Sets what became of a command to a device, and says it before anything else becomes of it.
+    fn tell_outcome(&mut self, device: &str, last: Json) {
+        if let Some(seen) = self.drives.get_mut(device) {
             seen.last = last;
             seen.snapshot = None;
             self.look();
@@ -299,39 +301,40 @@ impl Face {
         let mut there = BTreeSet::new();
         for (line, _) in fleet.lines() {
             for drive in fleet.drives_on(&line) {
-                there.insert(drive.name().to_string());
-                self.look_at(&line, &drive);
+                let id = self.plant.known_as(Kind::Drive, drive.name()).id;
+                self.look_at(&line, &id, &drive);
+                there.insert(id);
             }
         }
-        let gone: Vec<String> = self.drives.keys().filter(|name| !there.contains(*name)).cloned().collect();
-        for name in gone {
-            self.drives.remove(&name);
-            self.node.remove_device(&name);
+        let gone: Vec<String> = self.drives.keys().filter(|id| !there.contains(*id)).cloned().collect();
+        for id in gone {
+            self.drives.remove(&id);
+            self.node.remove_device(&id);
         }
     }
 
-    fn look_at(&mut self, line: &str, drive: &DriveHandle) {
-        let (name, snapshot, at) = (drive.name(), drive.snapshot(), Instant::now());
-        if !self.drives.contains_key(&**name) {
-            self.drives.insert(name.to_string(), Seen::default());
-            if let Err(error) = self.node.add_device(name, metrics::of_a_drive(), now()) {
+    fn look_at(&mut self, line: &str, id: &str, drive: &DriveHandle) {
+        let (snapshot, at) = (drive.snapshot(), Instant::now());
+        if !self.drives.contains_key(id) {
+            self.drives.insert(id.to_owned(), Seen::default());
+            if let Err(error) = self.node.add_device(id, metrics::of_a_drive(), now()) {
                 tracing::error!("Sparkplug: {error}");
             }
         }
-        let Some(seen) = self.drives.get_mut(&**name) else { return };
+        let Some(seen) = self.drives.get_mut(id) else { return };
         let freshness = Some((snapshot.freshness(at), snapshot.measurements_freshness(at)));
         let is_same = seen.snapshot.as_ref().is_some_and(|known| Arc::ptr_eq(known, &snapshot));
         if is_same && seen.freshness == freshness {
             return;
         }
-        let mut object = json!(DriveView::of(line, drive));
+        let mut object = json!(self.plant.view_of(line, drive));
         object["fault"]["present"] = snapshot.present_trip().is_some().into();
         object["last"] = seen.last.clone();
         for (metric, reading) in metrics::read_drive(&object, unix(at)) {
             // A device that was refused has no metrics; that has been said.
-            let _ = self.node.set_device(name, metric, reading);
+            let _ = self.node.set_device(id, metric, reading);
         }
-        self.node.set_present(name, snapshot.link == Link::Connected);
+        self.node.set_present(id, snapshot.link == Link::Connected);
         (seen.snapshot, seen.freshness) = (Some(snapshot), freshness);
     }
 
@@ -339,14 +342,15 @@ impl Face {
     fn look_at_lines(&mut self) {
         let (lines, at) = (self.plant.lines(), now());
         let drives = self.plant.fleet().drives();
-        let names: (BTreeSet<String>, BTreeSet<String>) = (
-            lines.iter().map(|line| line.name.clone()).collect(),
-            drives.iter().map(|drive| drive.name().to_string()).collect(),
+        let id = |kind, name: &str| self.plant.known_as(kind, name).id;
+        let ids: (BTreeSet<String>, BTreeSet<String>) = (
+            lines.iter().map(|line| line.known_as.id.clone()).collect(),
+            drives.iter().map(|drive| id(Kind::Drive, drive.name())).collect(),
         );
-        if names != self.names {
-            let owners = owners(&names);
-            match self.node.define(metrics::of_the_node(&names.0, &owners), at) {
-                Ok(()) => self.names = names,
+        if ids != self.ids {
+            let owners = owners(&ids);
+            match self.node.define(metrics::of_the_node(&ids.0, &owners), at) {
+                Ok(()) => self.ids = ids,
                 Err(error) => tracing::error!("Sparkplug: {error}"),
             }
         }
@@ -364,8 +368,17 @@ impl Face {
 
     /// Sets what the alarms of everybody are like.
     fn look_at_alarms(&mut self) {
-        let (mut alarms, at) = (self.plant.alarms().together(), now());
-        for owner in owners(&self.names) {
+        let at = now();
+        let id = |kind, name: String| self.plant.known_as(kind, &name).id;
+        let by_id = |owner| match owner {
+            Owner::Program => Owner::Program,
+            Owner::Line(name) => Owner::Line(id(Kind::Line, name)),
+            Owner::Drive(name) => Owner::Drive(id(Kind::Drive, name)),
+        };
+        let together = self.plant.alarms().together();
+        let mut alarms: BTreeMap<Owner, _> =
+            together.into_iter().map(|(owner, own)| (by_id(owner), own)).collect();
+        for owner in owners(&self.ids) {
             let own = alarms.remove(&owner).unwrap_or_default();
             for (metric, reading) in metrics::read_alarms(&owner, &own, at.unix_ms) {
                 let _ = self.node.set_node(&metric, reading);
@@ -383,7 +396,7 @@ impl Face {
     }
 }
 
-/// Who can have alarms, of these lines and drives.
+/// Who can have alarms, of the lines and drives of these ids.
 fn owners((lines, drives): &(BTreeSet<String>, BTreeSet<String>)) -> Vec<Owner> {
     let lines = lines.iter().cloned().map(Owner::Line);
     std::iter::once(Owner::Program).chain(lines).chain(drives.iter().cloned().map(Owner::Drive)).collect()

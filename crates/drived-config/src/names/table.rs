@@ -40,6 +40,9 @@ pub struct Configured {
 pub struct Known {
     /// Its name.
     pub name: String,
+    /// By which it is known wherever a name would do and must not change: the name that it had first, or one like it that nobody has.
+    #[serde(default)]
+    pub id: String,
     /// What it was when it was last configured.
     pub place: String,
     /// The number of a drive, from 0; `None`: it is no drive, or none was left.
@@ -184,19 +187,23 @@ impl Table {
         }
     }
 
-    /// What a version before this one has kept had the topics that follow from the names.
+    /// What a version before this one has kept had the topics and the ids that follow from the names.
     pub(super) fn complete(&mut self) {
         for known in [&mut self.drives, &mut self.lines, &mut self.groups].into_iter().flatten() {
+            if known.id.is_empty() {
+                known.id.clone_from(&known.name);
+            }
             if known.topic.is_empty() {
                 known.topic = topic_id(&known.name);
             }
         }
     }
 
-    /// What has to be well in what was read: no number, no name and no topic of one kind twice.
+    /// What has to be well in what was read: no number, no name, no id and no topic of one kind twice.
     pub(super) fn is_sound(&self) -> bool {
         let is_twice = |one: &Known, other: &Known| {
-            one.slot.is_some() && one.slot == other.slot || one.name == other.name || one.topic == other.topic
+            let is_slot = one.slot.is_some() && one.slot == other.slot;
+            is_slot || one.name == other.name || one.id == other.id || one.topic == other.topic
         };
         [&self.drives, &self.lines, &self.groups].into_iter().all(|all| {
             let twice = |(at, one): (usize, &Known)| all[..at].iter().any(|other| is_twice(one, other));
@@ -258,8 +265,16 @@ fn recognise(kind: &str, all: &mut Vec<Known>, there: &[Named], told: &mut Told)
         if topic != topic_id(name) {
             told.changed.push(format!("{kind}{name} has the topic {topic}"));
         }
+        // The name that another had first is his.
+        let others = |id: &String| all.iter().any(|known| known.id == *id);
+        let mark = |length| format!("{name}-{}", mark_of(name, length));
+        let id = std::iter::once((*name).clone()).chain((4..).step_by(4).map(mark)).find(|id| !others(id));
+        let id = id.unwrap_or_default();
+        if id != **name {
+            told.changed.push(format!("{kind}{name} has the id {id}"));
+        }
         let (name, place) = ((*name).clone(), (*place).clone());
-        all.push(Known { name, place, slot: None, topic, gone: false });
+        all.push(Known { name, id, place, slot: None, topic, gone: false });
     }
 }
 
@@ -271,6 +286,12 @@ pub fn topic_id(name: &str) -> String {
 
 /// The same with a mark of so many digits by which it is told from others.
 fn marked(name: &str, length: usize) -> String {
-    let mark = sha256(name.as_bytes());
-    format!("{}-{}", topic_id(name), mark.get(..length).unwrap_or(&mark))
+    format!("{}-{}", topic_id(name), mark_of(name, length))
+}
+
+/// So many digits that another name hardly has.
+fn mark_of(name: &str, length: usize) -> String {
+    let mut mark = sha256(name.as_bytes());
+    mark.truncate(length);
+    mark
 }

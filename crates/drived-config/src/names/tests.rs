@@ -223,3 +223,56 @@ fn what_a_version_without_topics_has_kept_has_those_that_it_told() {
     assert_eq!(names.topic(Kind::Drive, "Lüfter 1"), "L_fter_1");
     assert_eq!(names.slots().unwrap()[4].as_deref(), Some("Lüfter 1"));
 }
+
+#[test]
+fn numbers_that_were_lost_are_told_from_a_first_start_and_nobody_is_numbered_anew_before_a_person_says_so() {
+    let folder = Folder::new("names-lost");
+    let place = folder.file(FILE);
+    let parent = place.parent().unwrap();
+    // A first start keeps them also where there is no drive yet.
+    let first = Names::in_folder(Some(parent));
+    first.take_up(&Configured::default()).unwrap();
+    assert!(place.exists());
+    first.take_up(&named(&[("fan", "a 1"), ("pump", "a 2")])).unwrap();
+    assert_eq!(first.problem(), None);
+    for later in ["alarms.json", "history.sqlite", "webhooks.json"] {
+        std::fs::write(folder.file(later), "").unwrap();
+        _ = std::fs::remove_file(&place);
+        // The drives in another order than then: each would get the number of the other.
+        let there = named(&[("pump", "a 2"), ("fan", "a 1")]);
+        let names = Names::in_folder(Some(parent));
+        let error = names.take_up(&there).unwrap_err();
+        assert!(error.contains("it is lost") && error.contains(later), "{error}");
+        assert_eq!((names.problem(), names.slots()), (Some(error), None));
+        assert_eq!(names.known_as(Kind::Drive, "pump").slot, None);
+        assert!(!place.exists(), "nothing is kept that nobody has said");
+        let (table, aside) = renewed(&Kept::at(&place), &there).unwrap();
+        assert_eq!((names_of(&table), aside), (held(&["pump", "fan"]), None));
+        names.take_up(&there).unwrap();
+        assert_eq!((names.problem(), names.revision()), (None, Some(revision(&table.slots()))));
+        std::fs::remove_file(folder.file(later)).unwrap();
+    }
+}
+
+#[test]
+fn an_id_is_the_first_name_and_nobody_else_gets_it() {
+    let names = Names::default();
+    let id = |name: &str| names.known_as(Kind::Drive, name).id;
+    names.take_up(&named(&[("fan 3", "a 3"), ("blower", "a 4")])).unwrap();
+    assert_eq!(id("fan 3"), "fan 3");
+    names.take_up(&named(&[("extractor", "a 3"), ("blower", "a 4")])).unwrap();
+    // Another is called as it was.
+    let told = names.take_up(&named(&[("extractor", "a 3"), ("fan 3", "a 9"), ("blower", "a 4")])).unwrap();
+    // printf %s 'fan 3' | sha256sum
+    let expected = ["fan 3", "fan 3-9a7e", "blower"];
+    assert_eq!(["extractor", "fan 3", "blower"].map(id), expected, "{told:?}");
+    assert_eq!(names.name_of(Kind::Drive, "fan 3").as_deref(), Some("extractor"));
+    assert_eq!(
+        names.known_as(Kind::Drive, "extractor"),
+        KnownAs { id: "fan 3".to_owned(), short_name: "fan_3".to_owned(), slot: Some(0) }
+    );
+    names.take_up(&named(&[("blower", "a 4")])).unwrap();
+    assert_eq!(names.name_of(Kind::Drive, "fan 3"), None, "it is gone");
+    names.take_up(&named(&[("blower", "a 4"), ("extractor", "a 3")])).unwrap();
+    assert_eq!(id("extractor"), "fan 3");
+}

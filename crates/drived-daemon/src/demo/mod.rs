@@ -74,7 +74,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let groups = plant.groups();
     let faces = drived_plant::plant::Plant::start(plant.fleet.clone(), groups, true);
     let router = api::demo_router(faces.clone(), plant.stage()).merge(page::router());
-    let doors = doors.open(metrics::serve(router, faces, Vec::new()));
+    let doors = doors.open(metrics::serve(router, faces, Vec::new()), api::stops());
     let incoming = plant.fleet.events();
     let until = args.seconds.map(|seconds| time::Instant::now() + Duration::from_secs(u64::from(seconds)));
     let show = Show { plant: &plant, page, incoming, until, ending: &mut ending };

@@ -8,6 +8,7 @@ use drive_sim::SimSlave;
 use tokio::{sync::watch, time::Instant};
 
 use super::story::TELLER;
+use drived_config::names::KnownAs;
 use drived_plant::plant::views::DriveView;
 use drived_words::drive_spec::DriveName;
 
@@ -75,7 +76,7 @@ impl Unit {
 
     /// What is known of it.
     pub(super) fn drive(&self) -> DriveView {
-        DriveView::of("demo", &self.handle)
+        DriveView::of("demo", &self.handle, KnownAs::of_name(self.handle.name()))
     }
 
     /// How its last order ended.

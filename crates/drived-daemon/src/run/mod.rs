@@ -127,12 +127,13 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let watchdogs = records::follow(watchdogs, fleet.events(), watchdogs::note);
     let eeproms = records::follow(eeproms, fleet.events(), eeprom::note);
     let findings = tokio::spawn(findings::follow(fleet.clone()));
-    let alarms = KeptAlarms::in_folder(state.folder.as_deref());
-    let plant = Plant::start_with(fleet.clone(), config.groups.clone(), false, &alarms);
-    let alarms = plant.keep_alarms(alarms);
+    // Before anything is kept by which a later start sees that there was this one.
     let names = Names::in_folder(config.doors.state.folder.as_deref());
     tell_names(&names, &config.lines, &config.groups);
+    let alarms = KeptAlarms::in_folder(state.folder.as_deref());
+    let plant = Plant::start_with(fleet.clone(), config.groups.clone(), false, &alarms);
     plant.set_names(names.clone());
+    let alarms = plant.keep_alarms(alarms);
     plant.set_options(options(&config.lines));
     let opened = Opened::default();
     opened.tell(&config.lines);
@@ -149,7 +150,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
         .merge(api::setup::setup_router(first_hour.clone()))
         .merge(page::router());
     let sources: Vec<Arc<dyn Source>> = vec![Arc::new(reloader.clone()), Arc::new(faces.clone())];
-    let doors = doors.open(metrics::serve(router, plant.clone(), sources));
+    let doors = doors.open(metrics::serve(router, plant.clone(), sources), api::stops());
     plant.follow_audit(doors.audit().failing());
     let audited = doors.follow(fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());

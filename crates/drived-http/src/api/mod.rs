@@ -61,6 +61,11 @@ pub fn demo_router(plant: Plant, stage: Stage) -> Router {
     of(all, plant).layer(Extension(stage))
 }
 
+/// The addresses at which something is stopped, as the doors have to know them.
+pub fn stops() -> Vec<&'static str> {
+    routes().into_iter().filter(|route| route.stops).map(|route| route.path).collect()
+}
+
 /// The description of a daemon's API.
 pub fn described() -> serde_json::Value {
     document::of(

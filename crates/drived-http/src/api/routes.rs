@@ -43,6 +43,8 @@ pub(super) type Describe = fn(&mut SchemaGenerator) -> Schema;
 pub(super) struct Route {
     pub(super) path: &'static str,
     pub(super) method: Method,
+    /// Whether it stops: then the doors let it pass where they let nothing else.
+    pub(super) stops: bool,
     /// `None`: it is served by somebody else, at the doors or beside the plant.
     pub(super) handler: Option<MethodRouter<Plant>>,
     /// What it is for.
@@ -102,7 +104,8 @@ impl Route {
     /// One that is described here and served elsewhere.
     fn elsewhere(method: Method, path: &'static str, about: &'static str) -> Self {
         let (query, answers) = (Vec::new(), Vec::new());
-        Self { path, method, handler: None, about, query, body: None, answers, problems: vec![400, 401, 403] }
+        let problems = vec![400, 401, 403];
+        Self { path, method, stops: false, handler: None, about, query, body: None, answers, problems }
     }
 
     fn get<H, T>(path: &'static str, handler: H, about: &'static str) -> Self
@@ -127,6 +130,15 @@ impl Route {
         route.body = Some(SchemaGenerator::subschema_for::<B>);
         route.problems.extend([404, 409, 410, 413, 415, 422, 504]);
         route
+    }
+
+    /// A command that stops.
+    fn stop<H, T, B: JsonSchema>(path: &'static str, handler: H, about: &'static str) -> Self
+    where
+        H: Handler<T, Plant>,
+        T: 'static,
+    {
+        Self { stops: true, ..Self::command::<H, T, B>(path, handler, about) }
     }
 
     fn write<H, T>(path: &'static str, handler: H, about: &'static str) -> Self
@@ -487,7 +499,7 @@ fn commands() -> Vec<Route> {
             command::to_drive::<Start>,
             "Starts a motor",
         ),
-        Route::command::<_, _, Stop>("/api/v1/drives/{name}/stop", command::stop_drive, "Stops a motor"),
+        Route::stop::<_, _, Stop>("/api/v1/drives/{name}/stop", command::stop_drive, "Stops a motor"),
         Route::command::<_, _, NewSetpoint>(
             "/api/v1/drives/{name}/setpoint",
             command::to_drive::<NewSetpoint>,
@@ -508,7 +520,7 @@ fn commands() -> Vec<Route> {
             command::to_group::<Start>,
             "Starts every drive of a group, or none",
         ),
-        Route::command::<_, _, Stop>(
+        Route::stop::<_, _, Stop>(
             "/api/v1/groups/{name}/stop",
             command::stop_group,
             "Stops every drive of a group",
@@ -533,7 +545,7 @@ fn commands() -> Vec<Route> {
             command::to_selected::<Start>,
             "Starts the drives that are named, each by itself",
         ),
-        Route::command::<_, _, Selected<Stop>>(
+        Route::stop::<_, _, Selected<Stop>>(
             "/api/v1/selected/stop",
             command::stop_selected,
             "Stops the drives that are named",
@@ -578,6 +590,6 @@ fn commands() -> Vec<Route> {
             alarms::unshelve,
             "Takes an alarm back from where it was put aside",
         ),
-        Route::command::<_, _, Stop>("/api/v1/stop", command::stop_all, "Stops every drive"),
+        Route::stop::<_, _, Stop>("/api/v1/stop", command::stop_all, "Stops every drive"),
     ]
 }

@@ -22,9 +22,9 @@ const STATES: [State; 9] = [
     State::Unknown,
 ];
 
-pub(super) fn collect(line: &str, plan: Option<LinePlan>, drive: &DriveHandle, samples: &mut Samples) {
+/// Its labels are the ids of its line and its own.
+pub(super) fn collect(labels: [&str; 2], plan: Option<LinePlan>, drive: &DriveHandle, samples: &mut Samples) {
     let (snapshot, now) = (drive.snapshot(), Instant::now());
-    let labels = [line, &**drive.name()];
     tell_whole(&snapshot, drive, labels, now, samples);
     if snapshot.link == Link::Connected {
         tell_watchdog(&snapshot, plan, labels, samples);
@@ -46,7 +46,7 @@ fn tell_whole(
     now: Instant,
     samples: &mut Samples,
 ) {
-    let [line, name] = labels;
+    let [line, id] = labels;
     let identity = match &snapshot.identity {
         IdentityCheck::Same(identity)
         | IdentityCheck::Changed { found: identity, .. }
@@ -59,7 +59,7 @@ fn tell_whole(
     let firmware = said(|identity| &identity.version).unwrap_or_default();
     let (settings, address) = (drive.settings(), drive.slave().number().to_string());
     let family = drive.capabilities().key;
-    samples.add(Id::DriveInfo, &[line, name, &address, family, model, firmware], 1.0);
+    samples.add(Id::DriveInfo, &[line, id, drive.name(), &address, family, model, firmware], 1.0);
     samples.add(Id::DriveUp, &labels, flag(snapshot.link == Link::Connected));
     let last = snapshot.status.as_ref().map(|status| unix(status.at) as f64 / 1_000.0);
     samples.add_known(Id::DriveLastAnswer, &labels, last);
@@ -77,7 +77,7 @@ fn tell_whole(
     let pending = snapshot.stop.map(|stop| now.saturating_duration_since(stop.since).as_secs_f64());
     samples.add_known(Id::DriveStopPending, &labels, pending);
     for concern in snapshot.concerns(now) {
-        samples.add(Id::DriveConcern, &[line, name, concern.kind.word()], 1.0);
+        samples.add(Id::DriveConcern, &[line, id, concern.kind.word()], 1.0);
     }
     samples.add(Id::DriveStopUnconfirmed, &labels, flag(snapshot.stop.is_some_and(|stop| stop.alarm)));
 }

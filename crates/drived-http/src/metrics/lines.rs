@@ -1,7 +1,5 @@
 //! What is told of each line, from what it counts.
 
-use std::sync::Arc;
-
 use drive_bus::{Line, stats::SlaveStats};
 use drive_core::Class;
 use drive_fleet::{DriveHandle, LinePlan};
@@ -9,32 +7,32 @@ use drive_fleet::{DriveHandle, LinePlan};
 use super::{samples::Samples, table::Id};
 use drived_plant::plant::tally::Counts;
 
+/// A line with its id and its name, and its drives with their ids.
 pub(super) fn collect(
-    name: &Arc<str>,
+    (id, name): (&str, &str),
     line: &Line,
     plan: Option<LinePlan>,
-    drives: &[DriveHandle],
+    drives: &[(String, DriveHandle)],
     samples: &mut Samples,
 ) {
     let (protocol, stats) = (line.config().protocol.to_string(), line.stats());
-    let name = &**name;
-    samples.add(Id::LineInfo, &[name, &protocol], 1.0);
-    samples.add(Id::LineUp, &[name], if stats.opened > stats.lost { 1.0 } else { 0.0 });
-    samples.add(Id::LineBusy, &[name], stats.busy.as_secs_f64());
-    samples.add(Id::LineWorstStop, &[name], line.worst_case_stop().as_secs_f64());
-    samples.add_known(Id::LineSweep, &[name], plan.map(|plan| plan.sweep.as_secs_f64()));
-    samples.count(Id::LineWaiting, &[name], stats.queued as u64);
-    samples.count(Id::LineNoise, &[name], stats.noise_bytes);
-    samples.count(Id::LineReopens, &[name], stats.opened.saturating_sub(1));
+    samples.add(Id::LineInfo, &[id, name, &protocol], 1.0);
+    samples.add(Id::LineUp, &[id], if stats.opened > stats.lost { 1.0 } else { 0.0 });
+    samples.add(Id::LineBusy, &[id], stats.busy.as_secs_f64());
+    samples.add(Id::LineWorstStop, &[id], line.worst_case_stop().as_secs_f64());
+    samples.add_known(Id::LineSweep, &[id], plan.map(|plan| plan.sweep.as_secs_f64()));
+    samples.count(Id::LineWaiting, &[id], stats.queued as u64);
+    samples.count(Id::LineNoise, &[id], stats.noise_bytes);
+    samples.count(Id::LineReopens, &[id], stats.opened.saturating_sub(1));
     for class in Class::ALL {
-        let (of, labels) = (stats.class(class), [name, &class.to_string()]);
+        let (of, labels) = (stats.class(class), [id, &class.to_string()]);
         samples.count(Id::LineRequests, &labels, of.sent);
         samples.add_histogram(Id::LineQueueWait, &labels, of.waits.up_to(), of.waits.sum().as_secs_f64());
     }
-    for drive in drives {
+    for (drive_id, drive) in drives {
         // What a slave counts that is no drive of the configuration is in the sums of the line alone.
         if let Some(of) = stats.slaves.get(&drive.slave().number()) {
-            tell_exchanges(of, [name, drive.name()], samples);
+            tell_exchanges(of, [id, drive_id], samples);
         }
     }
     let sum = |count: fn(&SlaveStats) -> u64| stats.slaves.values().map(count).sum();
@@ -44,7 +42,7 @@ pub(super) fn collect(
         ("withdrawn", sum(|slave| slave.outcomes.withdrawn)),
         ("refused", sum(|slave| slave.outcomes.refused)),
     ] {
-        samples.count(Id::LineUnsent, &[name, reason], count);
+        samples.count(Id::LineUnsent, &[id, reason], count);
     }
     for (kind, count) in [
         ("late", sum(|slave| slave.late)),
@@ -53,7 +51,7 @@ pub(super) fn collect(
         ("wrong_count", sum(|slave| slave.wrong_count)),
         ("foreign", stats.foreign),
     ] {
-        samples.count(Id::LineFrameErrors, &[name, kind], count);
+        samples.count(Id::LineFrameErrors, &[id, kind], count);
     }
 }
 
@@ -75,11 +73,16 @@ fn tell_exchanges(slave: &SlaveStats, [line, drive]: [&str; 2], samples: &mut Sa
 }
 
 /// The commands to the drives of a line: those to drives that have left are not told any more.
-pub(super) fn collect_commands(line: &str, drives: &[DriveHandle], counts: &Counts, samples: &mut Samples) {
+pub(super) fn collect_commands(
+    line: &str,
+    drives: &[(String, DriveHandle)],
+    counts: &Counts,
+    samples: &mut Samples,
+) {
     for (command, count) in &counts.commands {
-        if drives.iter().any(|drive| **drive.name() == *command.drive) {
+        if let Some((id, _)) = drives.iter().find(|(_, drive)| **drive.name() == *command.drive) {
             let outcome = command.outcome.to_string();
-            let labels = [line, &command.drive, command.action.name(), &outcome, &command.face];
+            let labels = [line, id, command.action.name(), &outcome, &command.face];
             samples.count(Id::Commands, &labels, *count);
         }
     }

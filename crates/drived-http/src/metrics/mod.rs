@@ -34,6 +34,7 @@ use tokio::{sync::Mutex, time::Instant};
 pub use self::dashboard::dashboard;
 use self::{negotiation::wanted, requests::Requests};
 use crate::api::Viewer;
+use drived_config::names::Kind;
 use drived_plant::{
     counts::{Id, Samples, Source, samples, table},
     plant::Plant,
@@ -77,14 +78,21 @@ impl Metrics {
         let (fleet, counts) = (self.plant.fleet(), self.plant.tally().counts());
         samples.add_histogram(Id::StopConfirm, &[], counts.stops_up_to(), counts.stopping.as_secs_f64());
         for (name, line) in fleet.lines() {
-            let (plan, drives) = (fleet.plan(&name), fleet.drives_on(&name));
-            lines::collect(&name, &line, plan, &drives, &mut samples);
-            for drive in &drives {
-                drives::collect(&name, plan, drive, &mut samples);
+            let plan = fleet.plan(&name);
+            // Their series are the same whatever they are called.
+            let id = self.plant.known_as(Kind::Line, &name).id;
+            let drives: Vec<_> = fleet
+                .drives_on(&name)
+                .into_iter()
+                .map(|drive| (self.plant.known_as(Kind::Drive, drive.name()).id, drive))
+                .collect();
+            lines::collect((&id, &name), &line, plan, &drives, &mut samples);
+            for (drive_id, drive) in &drives {
+                drives::collect([&id, drive_id], plan, drive, &mut samples);
             }
-            lines::collect_commands(&name, &drives, &counts, &mut samples);
+            lines::collect_commands(&id, &drives, &counts, &mut samples);
         }
-        alarms::collect(&self.plant.alarms(), &mut samples);
+        alarms::collect(&self.plant, &mut samples);
         process::collect(&mut samples);
         for source in &self.sources {
             source.collect(&mut samples);

@@ -372,8 +372,8 @@ fn rules_of_the_table() -> String {
             _ => "",
         };
         let whose = match kind {
-            AlarmKind::Drive(_) => "{{ $labels.drive }}",
-            AlarmKind::LineAway | AlarmKind::LineSilent | AlarmKind::LineFinding => "line {{ $labels.line }}",
+            AlarmKind::Drive(_) => "{{ $labels.name }}",
+            AlarmKind::LineAway | AlarmKind::LineSilent | AlarmKind::LineFinding => "line {{ $labels.name }}",
             _ => "{{ $labels.instance }}",
         };
         let severity = if kind.wakes() { "page" } else { "warning" };
@@ -402,7 +402,9 @@ async fn an_alarm_is_told_by_its_kind_where_it_is_in_its_life() {
     plant.machines[0].trip(9);
     sleep(Duration::from_secs(5)).await;
     let of = |state: &str| {
-        format!("drived_alarms{{line=\"north\",drive=\"pump 1\",alarm=\"tripped\",state=\"{state}\"}}")
+        format!(
+            "drived_alarms{{line=\"north\",drive=\"pump 1\",name=\"pump 1\",alarm=\"tripped\",state=\"{state}\"}}"
+        )
     };
     let text = scrape(&plant).await;
     assert_eq!(series(&text, "drived_alarms").len(), 1, "{text}");

@@ -53,8 +53,8 @@ metrics! {
     ReloadTime: Gauge, "drived_config_last_reload_success_timestamp_seconds", [],
         "When the configuration that holds was read.";
 
-    DriveInfo: Info, "drived_drive_info", ["line", "drive", "address", "family", "model", "firmware"],
-        "What a drive is; model and firmware are empty until it has said them, or where its family cannot.";
+    DriveInfo: Info, "drived_drive_info", ["line", "drive", "name", "address", "family", "model", "firmware"],
+        "What a drive is. drive is its id, which it keeps, and name what it is called now; model and firmware are empty until it has said them, or where its family cannot.";
     DriveUp: Gauge, "drived_drive_up", ["line", "drive"], "Whether the drive answers.";
     DriveLastAnswer: Gauge, "drived_drive_last_answer_timestamp_seconds", ["line", "drive"],
         "When the last status of the drive was read; absent before the first.";
@@ -103,8 +103,8 @@ metrics! {
         "1 when a stop has not been confirmed for longer than the configuration allows, else 0.";
     DriveConcern: Gauge, "drived_drive_concern", ["line", "drive", "concern"],
         "1 for each thing that troubles the drive, by its word; absent otherwise.";
-    Alarms: Gauge, "drived_alarms", ["line", "drive", "alarm", "state"],
-        "How many alarms of a kind are in a state, by their words; drive is empty for those of a line, line too for those of the program.";
+    Alarms: Gauge, "drived_alarms", ["line", "drive", "name", "alarm", "state"],
+        "How many alarms of a kind are in a state, by their words; name is what the drive or the line is called now; drive is empty for those of a line, line too for those of the program.";
     AlarmsDropped: Counter, "drived_alarms_dropped_total", [],
         "Alarms that had returned and were dropped before somebody acknowledged them, because there were too many.";
     DriveWatchdogArmed: Gauge, "drived_drive_watchdog_armed", ["line", "drive"],
@@ -120,7 +120,8 @@ metrics! {
     DriveSaves: Counter, "drived_drive_eeprom_saves_total", ["line", "drive"],
         "Saves to EEPROM that were asked for here.";
 
-    LineInfo: Info, "drived_line_info", ["line", "protocol"], "What a line is.";
+    LineInfo: Info, "drived_line_info", ["line", "name", "protocol"],
+        "What a line is. line is its id, which it keeps, and name what it is called now.";
     LineUp: Gauge, "drived_line_up", ["line"], "Whether the port is there.";
     LineBusy: Counter, "drived_line_busy_seconds_total", ["line"],
         "The time in which the line was needed: its rate is the utilisation.";

@@ -32,7 +32,7 @@ use tokio::{
 
 pub use self::last::LastCommandView;
 use self::views::{
-    DaemonView, DriveView, ExchangeView, LineDetailView, LineView, MeasuredLineView, NoticeView,
+    DaemonView, DriveView, ExchangeView, GroupView, LineDetailView, LineView, MeasuredLineView, NoticeView,
     PlannedLineView, SettingsView, StateView,
 };
 use self::{
@@ -47,7 +47,11 @@ use self::{
     tally::Tally,
     usage::Usage,
 };
-use drived_config::{config::Group, names::Names, rights::Caller};
+use drived_config::{
+    config::Group,
+    names::{Kind, KnownAs, Names},
+    rights::Caller,
+};
 use drived_words::json::unix;
 
 /// How many of its last exchanges a line keeps, for whoever looks at it after something has gone wrong: 20 KiB a line.
@@ -125,6 +129,10 @@ impl Plant {
 
     pub fn state(&self, caller: &Caller) -> StateView {
         let now = Instant::now();
+        let group = |group: Group| {
+            let known_as = self.known_as(Kind::Group, &group.name);
+            GroupView::of(group, known_as)
+        };
         StateView {
             revision: self.0.revisions.last(),
             time_unix_ms: unix(now),
@@ -137,10 +145,11 @@ impl Plant {
                 caller: caller.name.clone(),
                 scope: caller.scope.is_some().then(|| self.commanded_by(caller)),
                 names_revision: self.0.names.get().and_then(Names::revision),
+                names_problem: self.0.names.get().and_then(Names::problem),
             },
             lines: self.lines(),
             drives: self.drives(),
-            groups: self.groups(),
+            groups: self.groups().into_iter().map(group).collect(),
             alarms: self.alarms().alarms,
         }
     }
@@ -188,6 +197,24 @@ impl Plant {
         let _ = self.0.names.set(names);
     }
 
+    /// By what a drive, a line or a group of this name is known.
+    pub fn known_as(&self, kind: Kind, name: &str) -> KnownAs {
+        self.0.known_as(kind, name)
+    }
+
+    /// The name of what is known by an id; `None`: nothing is, that is configured.
+    pub fn name_of(&self, kind: Kind, id: &str) -> Option<String> {
+        match self.0.names.get() {
+            Some(names) => names.name_of(kind, id),
+            None => Some(id.to_owned()),
+        }
+    }
+
+    /// A drive of a line as it is told.
+    pub fn view_of(&self, line: &str, drive: &DriveHandle) -> DriveView {
+        self.0.view_of(line, drive)
+    }
+
     /// What the configuration says of a drive that the bus cannot tell: its words mean nothing for certain without it.
     pub fn options(&self, drive: &str) -> Options {
         let options = self.0.options.read().unwrap_or_else(PoisonError::into_inner);
@@ -227,12 +254,12 @@ impl Plant {
 
     /// The drives, line by line.
     pub fn drives(&self) -> Vec<DriveView> {
-        self.members().map(|(line, drive)| DriveView::of(&line, &drive)).collect()
+        self.members().map(|(line, drive)| self.view_of(&line, &drive)).collect()
     }
 
     pub fn drive(&self, name: &str) -> Option<DriveView> {
         let (line, drive) = self.members().find(|(_, drive)| **drive.name() == *name)?;
-        Some(DriveView::of(&line, &drive))
+        Some(self.view_of(&line, &drive))
     }
 
     /// What a drive was told when the fleet was started, and what the plan of its line makes of it.
@@ -267,13 +294,22 @@ fn zone() -> Option<String> {
 }
 
 impl Inner {
+    fn known_as(&self, kind: Kind, name: &str) -> KnownAs {
+        self.names.get().map_or_else(|| KnownAs::of_name(name), |names| names.known_as(kind, name))
+    }
+
+    fn view_of(&self, line: &str, drive: &DriveHandle) -> DriveView {
+        DriveView::of(line, drive, self.known_as(Kind::Drive, drive.name()))
+    }
+
     fn lines(&self) -> Vec<LineView> {
         self.fleet.lines().iter().filter_map(|(name, line)| self.line(name, line)).collect()
     }
 
     fn line(&self, name: &str, line: &Line) -> Option<LineView> {
         let plan = self.fleet.plan(name)?;
-        Some(LineView::of(name, line, plan, &self.fleet.drives_on(name), &self.usage))
+        let known_as = self.known_as(Kind::Line, name);
+        Some(LineView::of((name, known_as), line, plan, &self.fleet.drives_on(name), &self.usage))
     }
 
     /// Looks at the lines, once a second: those that a reload has brought keep their last exchanges from then on.

@@ -18,7 +18,7 @@ use tokio::{
 use super::{
     Inner,
     revisions::Subject,
-    views::{DriveView, Gist, LineView, NoticeView},
+    views::{Gist, LineView, NoticeView},
 };
 use drived_words::json::unix;
 
@@ -114,7 +114,7 @@ async fn changes(plant: Weak<Inner>, line: Arc<str>, drive: DriveHandle) {
         });
         if is_new {
             let Some(plant) = plant.upgrade() else { return };
-            plant.revisions.push(Subject::Drive, &DriveView::of(&line, &drive));
+            plant.revisions.push(Subject::Drive, &plant.view_of(&line, &drive));
             told = Some((known, now));
         }
         sleep_until(now + TOGETHER).await;

@@ -118,8 +118,9 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
 fn object(table: &Table) -> Value {
     let of = |all: &[Known]| {
         let one = |known: &Known| {
-            let mut said =
-                json!({ "name": known.name, "topic": known.topic, "place": known.place, "gone": known.gone });
+            let mut said = json!({
+                "name": known.name, "id": known.id, "topic": known.topic, "place": known.place, "gone": known.gone
+            });
             if let Some(slot) = known.slot {
                 said["number"] = slot.into();
             }
@@ -135,11 +136,12 @@ fn configured(config: &Config) -> Configured {
 }
 
 fn say(table: &Table) -> Result<(), Failure> {
-    let mut rows = output::Table::new(["number", "drive", "topic", "where", ""]);
+    let mut rows = output::Table::new(["number", "drive", "id", "topic", "where", ""]);
     for known in &table.drives {
         let gone = if known.gone { "gone" } else { "" };
         let number = known.slot.map(|slot| slot.to_string()).unwrap_or_default();
-        rows.row([number, known.name.clone(), known.topic.clone(), known.place.clone(), gone.to_owned()]);
+        let (name, id, topic) = (known.name.clone(), known.id.clone(), known.topic.clone());
+        rows.row([number, name, id, topic, known.place.clone(), gone.to_owned()]);
     }
     output::say_table(rows)
 }

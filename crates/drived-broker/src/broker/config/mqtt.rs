@@ -26,6 +26,8 @@ const HEARTBEAT: Duration = Duration::from_secs(30);
 const SHORTEST_HEARTBEAT: Duration = Duration::from_secs(1);
 /// How long a value may wait until the next one is told.
 const INTERVAL: Duration = Duration::from_secs(1);
+/// The same of the slow values.
+const MEASUREMENTS: Duration = Duration::from_secs(10);
 /// The first levels of every topic.
 const BASE: &str = "drived";
 /// The first levels of the topics that Home Assistant reads.
@@ -53,6 +55,8 @@ pub struct MqttConfig {
     pub heartbeat: Duration,
     /// Between two tellings of values that change all the time.
     pub interval: Duration,
+    /// The same of the slow values.
+    pub measurements: Duration,
     /// Whether anybody may command through the broker.
     pub commands: bool,
     /// What those may do whose names are the last level of the topic; empty: everybody operates, and is called `mqtt`.
@@ -148,6 +152,7 @@ pub struct MqttEntry {
     base: Option<Spanned<String>>,
     heartbeat: Option<Spanned<Parsed<Time>>>,
     interval: Option<Parsed<Time>>,
+    measurements: Option<Parsed<Time>>,
     #[serde(default)]
     commands: bool,
     #[serde(default)]
@@ -199,6 +204,7 @@ impl MqttConfig {
             base,
             heartbeat,
             interval: entry.interval.map_or(INTERVAL, |time| time.0.0).min(heartbeat),
+            measurements: entry.measurements.map_or(MEASUREMENTS, |time| time.0.0).min(heartbeat),
             commands: entry.commands,
             commanders: entry.commanders.iter().map(|(name, role)| (name.get_ref().clone(), *role)).collect(),
             discovery: entry.discovery.map(|discovery| discovery.0).unwrap_or_default(),

@@ -113,9 +113,9 @@ fn shown(face: &Face, topic: impl Fn(&str) -> String) -> [Component; 6] {
             "identity",
             "sensor",
             json!({
-                "name": "Identity", "entity_category": "diagnostic", "state_topic": topic("state"),
-                "value_template": "{{ value_json.identity.model | default(none) }}", "expire_after": expire_after,
-                "json_attributes_topic": topic("state"),
+                "name": "Identity", "entity_category": "diagnostic", "state_topic": topic("about"),
+                "value_template": "{{ value_json.identity.model | default(none) }}",
+                "json_attributes_topic": topic("about"),
                 "json_attributes_template": "{{ value_json.identity | default({}) | to_json }}",
                 "availability": always, "availability_mode": "all",
             }),

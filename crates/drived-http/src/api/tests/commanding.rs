@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use axum::http::Method;
 use drive_core::{Frequency, State};
 use drive_fleet::{Band, DriveSettings, FrequencyLimits};
 use serde_json::json;
@@ -219,6 +220,32 @@ async fn drives_that_are_selected_are_commanded_each_by_itself_and_no_other() {
         let (status, told) = command(&plant.plant, "/api/v1/selected/reset", &body).await;
         assert_eq!(status, expected, "{body}: {told}");
     }
+}
+
+/// Every route is asked, and what it did is held against what the doors are told of it.
+#[tokio::test(start_paused = true)]
+async fn whatever_stops_is_known_to_the_doors_as_a_stop_and_nothing_else_is() {
+    let plant = TestPlant::of(1).await;
+    let known = crate::api::stops();
+    let mut stopped = Vec::new();
+    for route in crate::api::routes::routes() {
+        if route.method != Method::POST {
+            continue;
+        }
+        let name = if route.path.contains("/groups/") { "pumps" } else { "pump%201" };
+        let path = route.path.replace("{name}", name).replace("{id}", "1");
+        // As whoever may only stop: what he may do is a stop, and what is a stop he may do.
+        let rights = Rights { view: false, stop: true, operate: false, engineer: false };
+        let body = if path.contains("/selected/") { json!({"drives": ["pump 1"]}) } else { json!({}) };
+        let (status, told) = send(api(&plant.plant, "operator", rights), post(&path, &body)).await;
+        let stops = told["action"] == "stop";
+        assert_eq!(stops, status.is_success(), "{path}: {told}");
+        if stops {
+            stopped.push(route.path);
+        }
+    }
+    assert_eq!(stopped, known);
+    assert!(known.len() >= 4, "{known:?}");
 }
 
 #[tokio::test(start_paused = true)]

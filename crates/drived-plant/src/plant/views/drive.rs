@@ -12,9 +12,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use tokio::time::Instant;
 
+use drived_config::names::KnownAs;
+
 /// A drive: where it is, what it was told, and what is known of it.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct DriveView {
+    /// By what it is known that keeps over another name.
+    #[serde(flatten)]
+    pub known_as: KnownAs,
     pub line: String,
     pub slave: u8,
     /// The family, such as `atv312`.
@@ -41,9 +46,10 @@ impl DriveView {
     }
 
     /// A drive of a line as it is now.
-    pub fn of(line: &str, drive: &DriveHandle) -> Self {
+    pub fn of(line: &str, drive: &DriveHandle, known_as: KnownAs) -> Self {
         let settings = drive.settings();
         Self {
+            known_as,
             line: line.to_owned(),
             slave: drive.slave().number(),
             family: drive.capabilities().key.into(),

@@ -10,12 +10,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::plant::usage::Usage;
+use drived_config::names::KnownAs;
 use drived_words::json::{microseconds, milliseconds};
 
 /// A line, and what was counted on it since it was opened.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LineView {
     pub name: String,
+    /// By what it is known that keeps over another name.
+    #[serde(flatten)]
+    pub known_as: KnownAs,
     /// As `--line` takes it.
     pub port: String,
     pub protocol: String,
@@ -139,12 +143,19 @@ pub struct AnswerTimes {
 }
 
 impl LineView {
-    pub fn of(name: &str, line: &Line, plan: LinePlan, drives: &[DriveHandle], usage: &Usage) -> Self {
+    pub fn of(
+        (name, known_as): (&str, KnownAs),
+        line: &Line,
+        plan: LinePlan,
+        drives: &[DriveHandle],
+        usage: &Usage,
+    ) -> Self {
         let (config, stats) = (line.config(), line.stats());
         let slaves: Vec<SlaveView> =
             stats.slaves.iter().map(|(&slave, of)| SlaveView::of(slave, of, drives)).collect();
         Self {
             name: name.to_owned(),
+            known_as,
             port: config.to_string(),
             protocol: config.protocol.to_string(),
             link: if stats.opened > stats.lost { LineLink::Connected } else { LineLink::Away },

@@ -25,7 +25,7 @@ pub use self::{
     measured::{AnswersView, MeasuredLineView, PlannedLineView, SettingsView, StepView, TimesView},
     notice::{HappenedView, NoticeView},
 };
-use drived_config::{config::Group, rights::Rights};
+use drived_config::{config::Group, names::KnownAs, rights::Rights};
 
 /// Everything at one moment.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
@@ -37,10 +37,26 @@ pub struct StateView {
     pub daemon: DaemonView,
     pub lines: Vec<LineView>,
     pub drives: Vec<DriveView>,
-    pub groups: Vec<Group>,
+    pub groups: Vec<GroupView>,
     /// All alarms that are not over, in the order in which they came first.
     #[serde(default)]
     pub alarms: Vec<AlarmView>,
+}
+
+/// A group: who is in it, and by what it is known that keeps over another name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct GroupView {
+    pub name: String,
+    #[serde(flatten)]
+    pub known_as: KnownAs,
+    /// In the order in which they start.
+    pub drives: Vec<String>,
+}
+
+impl GroupView {
+    pub(super) fn of(Group { name, drives }: Group, known_as: KnownAs) -> Self {
+        Self { name, known_as, drives }
+    }
 }
 
 /// The program that answers, and what it lets the asker do.
@@ -64,4 +80,7 @@ pub struct DaemonView {
     /// has come, left, or has another name. Absent where nobody has a number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub names_revision: Option<u16>,
+    /// Why nobody has a number, such as that `names.json` was lost; absent where all is well.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub names_problem: Option<String>,
 }

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 ///
 /// # Errors
 /// Nothing can be scraped, or nobody knows by which name.
-pub(super) fn file_sd(doors: &DoorsConfig, host: Option<&str>) -> Result<Value, Failure> {
+pub(super) fn file_sd(doors: &DoorsConfig, host: Option<&str>, site: Option<&str>) -> Result<Value, Failure> {
     let off = || Failure::Input("nothing is scraped there: its HTTP server is off".to_owned());
     let http = doors.http.as_ref().ok_or_else(off)?;
     let (ip, port) = (http.listen.ip(), http.listen.port());
@@ -28,15 +28,19 @@ pub(super) fn file_sd(doors: &DoorsConfig, host: Option<&str>) -> Result<Value, 
     if let Some(host) = host {
         labels["host"] = json!(host);
     }
+    if let Some(site) = site {
+        labels["site"] = json!(name(site)?);
+    }
     Ok(json!([{ "targets": [target], "labels": labels }]))
 }
 
-/// A configuration for a host of this name.
+/// A configuration for a host of this name, at this site.
 ///
 /// # Errors
-/// It is no name.
-pub(super) fn template(host: &str) -> Result<String, Failure> {
-    Ok(include_str!("host.toml").replace("HOST", name(host)?))
+/// One of them is no name.
+pub(super) fn template(host: &str, site: Option<&str>) -> Result<String, Failure> {
+    let site = name(site.unwrap_or("plant"))?;
+    Ok(include_str!("host.toml").replace("SITE", site).replace("HOST", name(host)?))
 }
 
 /// A name as it stands in a URL and as a level of a topic.
@@ -44,8 +48,8 @@ fn name(host: &str) -> Result<&str, Failure> {
     let allowed = |character: char| character.is_ascii_alphanumeric() || "-._".contains(character);
     match !host.is_empty() && host.chars().all(allowed) {
         true => Ok(host),
-        false => {
-            Err(Failure::Input(format!("{host:?}: expected the name of a host: letters, digits, -, . and _")))
-        }
+        false => Err(Failure::Input(format!(
+            "{host:?}: expected the name of a host or a site: letters, digits, -, . and _"
+        ))),
     }
 }

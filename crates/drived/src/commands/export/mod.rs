@@ -29,6 +29,9 @@ pub(crate) struct Args {
     /// The name of the host, by which others reach it
     #[arg(long, value_name = "NAME", required_if_eq("what", "host"))]
     host: Option<String>,
+    /// The site of the host, as it stands in topics and labels; plant unless it is said
+    #[arg(long, value_name = "NAME")]
+    site: Option<String>,
     /// The folder of the man pages
     #[arg(long, value_name = "FOLDER", required_if_eq("what", "man"))]
     to: Option<PathBuf>,
@@ -69,10 +72,14 @@ pub(crate) fn run(args: &Args, program: clap::Command) -> Result<(), Failure> {
         }
         (What::FileSd, None) => {
             let config = Config::load_workable(&args.config)?;
-            output::say_as_it_is(format_args!("{:#}", hosts::file_sd(&config.doors, args.host.as_deref())?))
+            output::say_as_it_is(format_args!(
+                "{:#}",
+                hosts::file_sd(&config.doors, args.host.as_deref(), args.site.as_deref())?
+            ))
         }
         (What::Host, None) => {
-            output::say_as_it_is(hosts::template(args.host.as_deref().unwrap_or_default())?.trim_end())
+            let host = args.host.as_deref().unwrap_or_default();
+            output::say_as_it_is(hosts::template(host, args.site.as_deref())?.trim_end())
         }
         (What::Dashboard, None) => output::say_as_it_is(format_args!("{:#}", metrics::dashboard())),
     }

@@ -1,0 +1,419 @@
+//! Every face beside what the drives themselves say: five families on one line, read through the gateway word by word and by the manuals, and
+//! as the API, MQTT, a host of Sparkplug, Prometheus' text and the virtual unit tell them, with their ages; while drives are called otherwise,
+//! trip, are lost, leave and come back. `-- --nocapture` prints what each said.
+#![cfg(unix)]
+
+#[path = "mqtt/rig.rs"]
+mod rig;
+mod support;
+
+use std::{
+    collections::BTreeMap,
+    env, fs,
+    io::{BufRead as _, BufReader, Lines, Read as _, Write as _},
+    net::TcpStream,
+    path::{Path, PathBuf},
+    process::{Child, ChildStdin, ChildStdout, Command, Stdio},
+    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
+};
+
+use rig::Mosquitto;
+use serde_json::Value;
+use support::{Running, Sim, free_port, get, is_there, path, run};
+
+/// How long something may take to come true: a guard against waiting for ever.
+const PATIENCE: Duration = Duration::from_secs(120);
+/// A status is no older than this, by the configuration's default, and this much may lie between two looks.
+const OLDEST_S: f64 = 3.0 + 2.0;
+
+/// A drive, and where its manual has its output frequency and its current.
+struct Family {
+    drive: &'static str,
+    unit: u8,
+    /// Register, and Hz of a count; `None`: the manual has none, and nobody may tell a frequency.
+    frequency: Option<(u16, f64)>,
+    /// Register, and A of a count; `None`: it has none, or tells a share of its rated current.
+    current: Option<(u16, f64)>,
+}
+
+/// ATV312: BBV51701 p. 21, 3202 rFr 0.1 Hz, 3204 LCr 0.1 A. ATV28: p. 57 there, W451 rFr 0.1 Hz, W453 LCr 0.1 A. ATV58: its manual has neither.
+/// ATV21: §8.3, FD00 0.01 Hz, FE03 in 0.01 %. 3G3EV: §5.2, 0024h in the unit of n39, which is 0.1 Hz at 0, 0027h 0.1 A.
+const FAMILIES: [Family; 5] = [
+    Family { drive: "atv312@1", unit: 1, frequency: Some((3_202, 0.1)), current: Some((3_204, 0.1)) },
+    Family { drive: "atv28@2", unit: 2, frequency: Some((451, 0.1)), current: Some((453, 0.1)) },
+    Family { drive: "atv58@3", unit: 3, frequency: None, current: None },
+    Family { drive: "atv21@4", unit: 4, frequency: Some((0xFD00, 0.01)), current: None },
+    Family { drive: "3g3ev@5", unit: 5, frequency: Some((0x0024, 0.1)), current: Some((0x0027, 0.1)) },
+];
+
+/// What somebody says of a drive. Frequency and current in hundredths, so that they are the same or not.
+#[derive(Debug, Clone, PartialEq)]
+struct Said {
+    frequency: Option<i64>,
+    current: Option<i64>,
+    state: Option<String>,
+    /// When it was so, in seconds since 1970.
+    at: Option<f64>,
+}
+
+impl Said {
+    /// He says that nothing is known of it.
+    const NOTHING: Self = Self { frequency: None, current: None, state: None, at: None };
+}
+
+fn hundredths(value: f64) -> i64 {
+    (value * 100.0).round() as i64
+}
+
+fn now() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).expect("it is later than 1970").as_secs_f64()
+}
+
+/// A host of Sparkplug: pysparkplug. Killed when dropped.
+struct Host {
+    child: Child,
+    asks: ChildStdin,
+    lines: Lines<BufReader<ChildStdout>>,
+}
+
+impl Host {
+    fn start(python: &str, broker: u16) -> Self {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/sparkplug_values.py");
+        let mut child = Command::new(python)
+            .arg(script)
+            .arg(broker.to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the script starts");
+        let asks = child.stdin.take().expect("it is piped");
+        let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
+        assert_eq!(lines.next().expect("it speaks").expect("it is text"), "ready");
+        Self { child, asks, lines }
+    }
+
+    fn ask(&mut self) -> Value {
+        writeln!(self.asks).expect("it reads");
+        let line = self.lines.next().expect("it has not ended").expect("it is text");
+        serde_json::from_str(&line).expect("it is JSON")
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The plant, and everybody who reads it.
+struct Plant {
+    sim: Sim,
+    daemon: Running,
+    broker: Mosquitto,
+    host: Host,
+    http: u16,
+    gateway: u16,
+    folder: PathBuf,
+    /// The names of the drives now, in the order of the families; an empty one is not in the file.
+    names: [String; 5],
+}
+
+impl Plant {
+    fn start() -> Option<Self> {
+        let python = env::var("DRIVED_SPARKPLUG_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+        if !is_there(&python, &["-c", "import pysparkplug"]) {
+            return None;
+        }
+        let broker = Mosquitto::start("values")?;
+        let drives = FAMILIES.map(|family| family.drive);
+        let sim = Sim::serve_with("values-line", &drives, &["--baud", "19200", "--format", "8N1"]);
+        let folder = path("values-folder");
+        fs::create_dir_all(&folder).expect("the directory can be written");
+        let host = Host::start(&python, broker.port);
+        let names =
+            FAMILIES.map(|family| format!("the {}", family.drive.split('@').next().unwrap_or_default()));
+        let (http, gateway) = (free_port(), free_port());
+        configure(&folder, (sim.link(), broker.port, http, gateway), &names);
+        let at = |name: &str| folder.join(name).display().to_string();
+        let mut daemon = Running::start(&["run", "--config", &at("drives.toml"), "--socket", &at("socket")]);
+        for _ in drives {
+            daemon.wait_for(r#""event":"connected""#);
+        }
+        Some(Self { sim, daemon, broker, host, http, gateway, folder, names })
+    }
+
+    fn at(&self, name: &str) -> String {
+        self.folder.join(name).display().to_string()
+    }
+
+    /// Another configuration holds.
+    fn reload(&self) {
+        configure(&self.folder, (self.sim.link(), self.broker.port, self.http, self.gateway), &self.names);
+        run(&["reload", "--socket", &self.at("socket")]).assert_done();
+    }
+
+    /// Registers of a unit, by somebody who speaks Modbus TCP; `None`: it does not answer.
+    fn words(&self, unit: u8, address: u16, count: u16) -> Option<Vec<u16>> {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.gateway)).expect("it listens");
+        stream.set_read_timeout(Some(PATIENCE)).expect("it does not wait for ever");
+        let [high, low] = address.to_be_bytes();
+        stream.write_all(&[0, 1, 0, 0, 0, 6, unit, 3, high, low, 0, count as u8]).expect("it reads");
+        let mut head = [0; 9];
+        stream.read_exact(&mut head).expect("each request is answered");
+        (head[7] == 3).then(|| {
+            let mut words = vec![0; usize::from(head[8])];
+            stream.read_exact(&mut words).expect("it is whole");
+            words.chunks(2).map(|word| u16::from_be_bytes([word[0], word[1]])).collect()
+        })
+    }
+
+    /// What a drive itself says, by its manual.
+    fn itself(&self, family: &Family) -> (Option<i64>, Option<i64>) {
+        let word = |(address, count): (u16, f64)| {
+            let word = self.words(family.unit, address, 1)?[0];
+            // rFr is signed; what a face tells is how fast, and the direction is a value of its own.
+            Some(hundredths(f64::from((word as i16).unsigned_abs()) * count))
+        };
+        (family.frequency.and_then(word), family.current.and_then(word))
+    }
+
+    /// What each face says of the drive of this id, short name and place.
+    fn faces(&mut self, id: &str, short: &str, slot: u16) -> [(&'static str, Said); 5] {
+        [
+            ("API", self.api(id)),
+            ("MQTT", self.mqtt(short)),
+            ("Sparkplug", self.sparkplug(id)),
+            ("Prometheus", self.prometheus(id)),
+            ("virtual unit", self.virtual_unit(slot)),
+        ]
+    }
+
+    fn api(&self, id: &str) -> Said {
+        let state: Value = serde_json::from_str(&get(self.http, "/api/v1/state", "*/*")).expect("it is JSON");
+        let drives = state["drives"].as_array().expect("a list");
+        let drive = drives.iter().find(|drive| drive["id"] == id);
+        drive.map_or(Said::NOTHING, |drive| live(&drive["status"], &state["time_unix_ms"]))
+    }
+
+    fn mqtt(&self, short: &str) -> Said {
+        let (port, topic) = (self.broker.port.to_string(), format!("drived/drive/{short}"));
+        let told = Command::new("mosquitto_sub")
+            .args([
+                "-V",
+                "5",
+                "-p",
+                &port,
+                "-t",
+                &format!("{topic}/state"),
+                "-t",
+                &format!("{topic}/availability"),
+            ])
+            .args(["-C", "2", "-W", "3", "-F", "%t %p"])
+            .output()
+            .expect("it comes with mosquitto");
+        let told = String::from_utf8(told.stdout).expect("it is text");
+        let told: BTreeMap<&str, &str> = told.lines().filter_map(|line| line.split_once(' ')).collect();
+        let of = |what: &str| told.get(format!("{topic}/{what}").as_str()).copied().unwrap_or_default();
+        if of("availability") != "online" {
+            return Said::NOTHING;
+        }
+        let state: Value = serde_json::from_str(of("state")).unwrap_or_default();
+        live(&state["status"], &state["time_unix_ms"])
+    }
+
+    fn sparkplug(&mut self, id: &str) -> Said {
+        let all = self.host.ask();
+        let Some(device) = all.get(id) else { return Said::NOTHING };
+        let value = |name: &str| device[name][0].as_f64().map(hundredths);
+        Said {
+            frequency: value("Status/Output Frequency"),
+            current: value("Status/Current"),
+            state: device["Status/State"][0].as_str().map(str::to_owned),
+            at: device["Status/State"][1].as_f64().map(|ms| ms / 1_000.0),
+        }
+    }
+
+    fn prometheus(&self, id: &str) -> Said {
+        let text = get(self.http, "/metrics", "*/*");
+        let value = |metric: &str, more: &str| {
+            let series = format!("drived_drive_{metric}{{line=\"bench\",drive=\"{id}\"{more}}} ");
+            text.lines().find_map(|line| line.strip_prefix(&series)?.parse::<f64>().ok())
+        };
+        let states = [
+            "not_ready",
+            "disabled",
+            "ready",
+            "running",
+            "stopping",
+            "quick_stop",
+            "fault_reaction",
+            "fault",
+        ];
+        let state = states.iter().find(|state| value("state", &format!(",state=\"{state}\"")) == Some(1.0));
+        Said {
+            frequency: value("output_frequency_hertz", "").map(hundredths),
+            current: value("motor_current_amperes", "").map(hundredths),
+            state: state.map(|state| (*state).to_owned()),
+            // That it answered last is told of one that is lost, too.
+            at: state.and_then(|_| value("last_answer_timestamp_seconds", "")),
+        }
+    }
+
+    /// As the README has the overview: flags, frequency in 0.01 Hz, current in 0.1 A, age in 0.1 s.
+    fn virtual_unit(&self, slot: u16) -> Said {
+        let words = self.words(247, 16 + 4 * slot, 4).expect("it is answered without the line");
+        let known = |word: u16| Some(word).filter(|word| *word != 0xFFFF).map(i64::from);
+        let states = [
+            "",
+            "not_ready",
+            "disabled",
+            "ready",
+            "running",
+            "stopping",
+            "quick_stop",
+            "fault_reaction",
+            "fault",
+        ];
+        if words[0] >> 8 & 3 != 2 {
+            assert_eq!((known(words[1]), known(words[2])), (None, None), "what is not good is not told");
+            return Said::NOTHING;
+        }
+        Said {
+            frequency: known(words[1]),
+            current: known(words[2]).map(|deciamperes| deciamperes * 10),
+            state: states.get(usize::from(words[0] & 15)).map(|state| (*state).to_owned()),
+            at: known(words[3]).map(|age| now() - age as f64 / 10.0),
+        }
+    }
+
+    /// Waits until every face says of a drive what it says itself, and that it is so now.
+    fn agree(&mut self, step: &str, place: usize, state: Option<&str>) {
+        let family = &FAMILIES[place];
+        let short = family.drive.split('@').next().unwrap_or_default();
+        let (id, topic, slot) = (format!("the {short}"), format!("the_{short}"), place as u16);
+        let end = Instant::now() + PATIENCE;
+        loop {
+            let (before, begun) = (self.itself(family), now());
+            let faces = self.faces(&id, &topic, slot);
+            let (after, ended) = (self.itself(family), now());
+            let is_right = |face: &str, said: &Said| match state {
+                None => *said == Said::NOTHING,
+                Some(state) => {
+                    let is_state = match (said.state.as_deref(), state) {
+                        (Some("ready" | "disabled" | "not_ready"), "at rest") => {
+                            said.state == faces[0].1.state
+                        }
+                        (said, state) => said == Some(state),
+                    };
+                    // A host of Sparkplug has the time of the last change.
+                    let oldest = if face == "Sparkplug" { 0.0 } else { begun - OLDEST_S };
+                    let is_now = said.at.is_some_and(|at| (oldest..=ended + 0.2).contains(&at));
+                    (said.frequency, said.current) == after && is_state && is_now
+                }
+            };
+            // What moves between two looks shows nothing.
+            let has_told = after.0.is_some() || family.frequency.is_none();
+            let is_still = before == after && (state.is_none() || has_told);
+            if is_still && faces.iter().all(|(face, said)| is_right(face, said)) {
+                let told = |said: &Said| match (&said.state, said.frequency, said.current, said.at) {
+                    (Some(state), frequency, current, at) => {
+                        let hertz = frequency
+                            .map_or("?".to_owned(), |hertz| format!("{:.2} Hz", hertz as f64 / 100.0));
+                        let amperes = current
+                            .map_or(String::new(), |amperes| format!(", {:.1} A", amperes as f64 / 100.0));
+                        let age =
+                            at.map_or(String::new(), |at| format!(", {:.1} s old", (ended - at).max(0.0)));
+                        format!("{state}, {hertz}{amperes}{age}")
+                    }
+                    _ => "nothing".to_owned(),
+                };
+                let told: Vec<String> = faces.iter().map(|(_, said)| told(said)).collect();
+                println!("| {step} | {} | {} |", family.drive, told.join(" | "));
+                return;
+            }
+            assert!(
+                Instant::now() < end,
+                "{step}: {id} says {before:?}, {after:?}, expected {state:?}: {faces:#?}"
+            );
+        }
+    }
+
+    fn all_agree(&mut self, step: &str, states: [Option<&str>; 5]) {
+        for (place, state) in states.into_iter().enumerate() {
+            self.agree(step, place, state);
+        }
+    }
+}
+
+/// What a status of the API says, where it is one of now.
+fn live(status: &Value, time_unix_ms: &Value) -> Said {
+    if status["quality"] != "good" {
+        return Said::NOTHING;
+    }
+    let age_ms = status["age_ms"].as_f64().expect("each value has its age");
+    Said {
+        frequency: status["output_frequency_hz"].as_f64().map(hundredths),
+        current: status["current_a"].as_f64().map(hundredths),
+        state: status["state"].as_str().map(str::to_owned),
+        at: time_unix_ms.as_f64().map(|time| (time - age_ms) / 1_000.0),
+    }
+}
+
+fn configure(folder: &Path, (link, broker, http, gateway): (&str, u16, u16, u16), names: &[String; 5]) {
+    let mut text = format!(
+        "state = \"state\"\n[http]\nlisten = \"127.0.0.1:{http}\"\n[mqtt]\nservers = [\"mqtt://127.0.0.1:{broker}\"]\nheartbeat = \"1s\"\n\
+         [mqtt.sparkplug]\ngroup = \"plant\"\nedge_node = \"hall 1\"\n\
+         [[gateways]]\nlisten = \"127.0.0.1:{gateway}\"\nvirtual_unit = 247\nunits = {{ "
+    );
+    let named = || FAMILIES.iter().zip(names).filter(|(_, name)| !name.is_empty());
+    let units: Vec<String> = named().map(|(family, name)| format!("{} = \"{name}\"", family.unit)).collect();
+    text += &format!("{} }}\n[lines.bench]\nport = \"{link},19200,8N1\"\n", units.join(", "));
+    for (family, name) in named() {
+        text += &format!(
+            "[[drives]]\nline = \"bench\"\ndrive = \"{}\"\nname = \"{name}\"\ncontrol = true\n",
+            family.drive
+        );
+    }
+    fs::write(folder.join("drives.toml"), text).expect("it can be written");
+}
+
+#[test]
+fn every_face_tells_what_the_drives_say_while_they_move_trip_are_renamed_lost_and_gone() {
+    let Some(mut plant) = Plant::start() else { return };
+    println!(
+        "| Step | Drive | API | MQTT | Sparkplug | Prometheus | Virtual unit |\n|---|---|---|---|---|---|---|"
+    );
+    let socket = plant.at("socket");
+    for (name, hertz) in plant.names.clone().iter().zip(["10Hz", "15Hz", "20Hz", "25Hz", "30Hz"]) {
+        run(&["start", name, "--setpoint", hertz, "--socket", &socket]).assert_done();
+    }
+    plant.all_agree("they run", [Some("running"); 5]);
+
+    // Another name: the same device, series, topic and place.
+    plant.names[1] = "the mixer".to_owned();
+    plant.reload();
+    plant.all_agree("one is called otherwise", [Some("running"); 5]);
+
+    plant.sim.say("atv312@1 trip OCF", "done");
+    plant.all_agree(
+        "one trips",
+        [Some("fault"), Some("running"), Some("running"), Some("running"), Some("running")],
+    );
+
+    plant.sim.say("atv58@3 power off", "done");
+    plant.all_agree("one is lost", [Some("fault"), Some("running"), None, Some("running"), Some("running")]);
+
+    let gone = std::mem::take(&mut plant.names[3]);
+    plant.reload();
+    plant.all_agree("one is taken out", [Some("fault"), Some("running"), None, None, Some("running")]);
+
+    plant.sim.say("atv58@3 power on", "done");
+    plant.names[3] = gone;
+    plant.reload();
+    // Who was stopped as he left stands, and so does who had no power.
+    let states = [Some("fault"), Some("running"), Some("at rest"), Some("at rest"), Some("running")];
+    plant.all_agree("both are back", states);
+    assert_eq!(plant.daemon.interrupt().0, Some(0));
+    fs::remove_dir_all(&plant.folder).expect("it is there");
+}
