@@ -436,10 +436,10 @@ impl Stage {
                 lies.push(format!("it is told to have {hertz} Hz"));
             }
         }
-        if let (Some(direction), true) = (status.direction, status.state == State::Running) {
-            if !ever(&|truth| truth.direction == direction || truth.hertz.abs() < 1.0) {
-                lies.push(format!("it is told to turn {direction}"));
-            }
+        if let (Some(direction), State::Running) = (status.direction, status.state)
+            && !ever(&|truth| truth.direction == direction || truth.hertz.abs() < 1.0)
+        {
+            lies.push(format!("it is told to turn {direction}"));
         }
         for lie in lies {
             self.contradictions.push(format!("{lie}: {status:?}, around it {around:?}"));
