@@ -242,7 +242,11 @@ impl Stage {
         use tokio_modbus::client::Writer as _;
         let mut other = tokio_modbus::client::Context::from(self.line.slave(1));
         for &(register, word) in words {
-            other.write_single_register(register, word).await.expect("it answers").expect("it takes it");
+            other
+                .write_multiple_registers(register, &[word])
+                .await
+                .expect("it answers")
+                .expect("it takes it");
             sleep(Duration::from_millis(150)).await;
         }
     }
@@ -286,12 +290,20 @@ impl Stage {
         self.set_setpoint(20).await;
         self.start(Direction::Forward).await;
         self.until("20 Hz", |truth| truth.hertz > 19.5).await;
-        self.say("deaf 3").await;
+        self.say("deaf 6").await;
         self.until_lost().await;
         self.drive.forget();
         self.until_answer().await;
         self.look_for("back", Duration::from_secs(1)).await;
         self.stop().await;
+        // Its own watchdog may have stopped it, as it comes from the factory.
+        while self.now().tripped {
+            let reset = self.drive.reset_faults().await;
+            self.note("reset", &outcome(&reset));
+            let unsent = reset.is_err_and(|error| error.kind() == ErrorKind::NotSent);
+            self.settle(Duration::from_secs(1)).await;
+            assert!(unsent || !self.now().tripped, "{}: {}", self.kind.key, self.told);
+        }
 
         // A power cycle in the middle: nothing starts it again.
         self.start(Direction::Forward).await;
@@ -335,7 +347,7 @@ impl Stage {
         self.stop().await;
     }
 
-    async fn set_setpoint(&mut self, hertz: u32) {
+    async fn set_setpoint(&mut self, hertz: u16) {
         let set = self.drive.set_setpoint(Frequency::from_hertz(hertz).into()).await;
         self.note(&format!("{hertz} Hz"), &outcome(&set));
         // Of some drives nothing shows a setpoint before they run: that is said, and is no refusal.
@@ -344,11 +356,20 @@ impl Stage {
     }
 
     async fn start(&mut self, direction: Direction) {
-        let started = self.drive.start(direction).await;
-        self.note(&format!("start {direction}"), &outcome(&started));
-        assert!(started.is_ok(), "{}: {}", self.kind.key, self.told);
-        self.look_for("started", Duration::from_millis(300)).await;
-        self.claim(self.now().running, "a start is confirmed, and its output is off");
+        // Behind a lost answer the line keeps a slave's late answers apart, and an order may expire before its turn: nothing was sent.
+        for _ in 0..10 {
+            let started = self.drive.start(direction).await;
+            self.note(&format!("start {direction}"), &outcome(&started));
+            if started.is_ok() {
+                self.look_for("started", Duration::from_millis(300)).await;
+                self.claim(self.now().running, "a start is confirmed, and its output is off");
+                return;
+            }
+            let unsent = started.is_err_and(|error| error.kind() == ErrorKind::NotSent);
+            assert!(unsent, "{}: {}", self.kind.key, self.told);
+            sleep(Duration::from_millis(300)).await;
+        }
+        panic!("{}: it is never sent: {}", self.kind.key, self.told);
     }
 
     async fn stop(&mut self) {
@@ -415,10 +436,10 @@ impl Stage {
                 lies.push(format!("it is told to have {hertz} Hz"));
             }
         }
-        if let (Some(direction), true) = (status.direction, status.state == State::Running) {
-            if !ever(&|truth| truth.direction == direction || truth.hertz.abs() < 1.0) {
-                lies.push(format!("it is told to turn {direction}"));
-            }
+        if let (Some(direction), State::Running) = (status.direction, status.state)
+            && !ever(&|truth| truth.direction == direction || truth.hertz.abs() < 1.0)
+        {
+            lies.push(format!("it is told to turn {direction}"));
         }
         for lie in lies {
             self.contradictions.push(format!("{lie}: {status:?}, around it {around:?}"));

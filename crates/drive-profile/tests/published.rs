@@ -36,7 +36,10 @@ const MISTAKES: &[Mistake] = &[
     (
         "FluidNC: a stop that failed is remembered as done",
         V20,
-        &[("words = [0x047E] }], seen = [\"ready\", \"not_ready\", \"fault\"]", "words = [0x047E] }]")],
+        &[(
+            "words = [0x047E] }], seen = [\"ready\", \"disabled\", \"not_ready\", \"fault\"]",
+            "words = [0x047E] }]",
+        )],
         Refused("left in silence"),
     ),
     (

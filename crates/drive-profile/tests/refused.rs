@@ -50,7 +50,7 @@ fn a_stop_that_holds_a_run_bit() {
 fn a_stop_that_nothing_shows() {
     refused(
         V20,
-        "words = [0x047E] }], seen = [\"ready\", \"not_ready\", \"fault\"]",
+        "words = [0x047E] }], seen = [\"ready\", \"disabled\", \"not_ready\", \"fault\"]",
         "words = [0x047E] }]",
         "left in silence",
     );
@@ -61,7 +61,7 @@ fn a_stop_that_is_done_while_the_motor_runs() {
     let by = "words = [0x047E] }], seen = [\"ready\", \"running\", \"fault\"]";
     refused(
         V20,
-        "words = [0x047E] }], seen = [\"ready\", \"not_ready\", \"fault\"]",
+        "words = [0x047E] }], seen = [\"ready\", \"disabled\", \"not_ready\", \"fault\"]",
         by,
         "while the motor runs",
     );

@@ -31,8 +31,9 @@ fn no_profile_that_is_shipped_rests_on_a_weak_source_or_on_memory() {
 #[test]
 fn the_readme_has_the_table_of_what_is_shipped() {
     let mut table = String::from(
-        "| Drive | Key | Level | What keeps it from the next | What else is not known |\n|---|---|---|---|---|\n",
+        "| Drive | Key | Level | What keeps it from the next | What else is not known | Sources | Strangers that drove it |\n|---|---|---|---|---|---|---|\n",
     );
+    let strangers = strangers();
     for profile in shipped::all() {
         let told = |keeps: bool| {
             let gaps = profile.gaps().iter().filter(|gap| gap.keeps_from.is_some() == keeps);
@@ -40,7 +41,18 @@ fn the_readme_has_the_table_of_what_is_shipped() {
             if told.is_empty() { "—".to_owned() } else { told.join("; ") }
         };
         let (name, key, level) = (profile.name(), profile.key(), profile.level());
-        table.push_str(&format!("| {name} | `{key}` | {level} | {} | {} |\n", told(true), told(false)));
+        let sources = profile.file().sources.values().map(drive_profile::format::Spanned::get_ref);
+        let sources: Vec<String> =
+            sources.map(|source| format!("{} ({:?})", source.document, source.mark)).collect();
+        let drove: Vec<&str> =
+            strangers.iter().filter(|(of, _)| of == key).map(|(_, file)| file.as_str()).collect();
+        let drove = if drove.is_empty() { "—".to_owned() } else { drove.join(", ") };
+        table.push_str(&format!(
+            "| {name} | `{key}` | {level} | {} | {} | {} | {drove} |\n",
+            told(true),
+            told(false),
+            sources.join("; ")
+        ));
     }
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/README.md");
     let readme = std::fs::read_to_string(path).expect("it is there");
@@ -55,6 +67,18 @@ fn the_readme_has_the_table_of_what_is_shipped() {
         readme.contains(&table),
         "UPDATE_README=1 cargo test -p drive-profile --test shipped writes it:\n{table}"
     );
+}
+
+/// Profile and stranger, as the test names them that drives the one through the other.
+fn strangers() -> Vec<(String, String)> {
+    let test = include_str!("../../../tests/profile_strangers.rs");
+    let kinds = test.split("kind(\"").skip(1).filter_map(|rest| {
+        let mut quoted = rest.split('"');
+        let key = quoted.next()?;
+        let file = quoted.nth(1).filter(|file| file.ends_with(".py"))?;
+        Some((key.to_owned(), file.to_owned()))
+    });
+    kinds.collect()
 }
 
 #[test]

@@ -8,7 +8,7 @@ use drive_core::{
 use tokio::time::Instant;
 
 use super::{ProfileDrive, Words, hundredths, plan::Block};
-use crate::format::{Answer, Owner as OwnerBits, Proves, Space, UnitName};
+use crate::format::{Answer, Owner as OwnerBits, Proves, Space, StateName, UnitName};
 
 pub(super) const OTHERS: Refusal = Refusal::Overridden {
     by: "something else than the bus",
@@ -227,6 +227,10 @@ impl<P: Port> ProfileDrive<P> {
                 Some(output) => Output::Braking(output),
                 None => Output::NotKnown,
             },
+            // A drive of which nothing shows that it runs may run in any of these.
+            State::Ready | State::Disabled | State::NotReady if output.is_none() && !self.shows_running() => {
+                Output::NotKnown
+            }
             State::Ready | State::Disabled | State::NotReady => match output {
                 Some(output) if output != Frequency::ZERO => Output::Braking(output),
                 // Whatever feeds a motor that stands, direct current perhaps: its output is not cut.
@@ -239,6 +243,11 @@ impl<P: Port> ProfileDrive<P> {
             },
             State::Unknown => Output::NotKnown,
         }
+    }
+
+    /// Whether a state of its profile is that of a motor that runs.
+    fn shows_running(&self) -> bool {
+        self.profile.file().state.is.iter().any(|is| is.get_ref().state == StateName::Running)
     }
 
     /// The command that the drive is read to hold.
