@@ -313,7 +313,14 @@ impl<P: Port> Atv21<P> {
     async fn read_each(&mut self, class: Class, registers: &[Register<Read>]) -> Result<Vec<RawWord>> {
         let mut words = Vec::with_capacity(registers.len());
         for &register in registers {
-            if let Some(value) = self.optional(class, register).await? {
+            // Every 21 has its status word. Without it nothing is known of the motor: a refusal of it is an error, and no word of zeros,
+            // which would say that the output is cut.
+            let value = if register.address() == map::STATUS_WORD.address() {
+                Some(self.registers.at(class).read(register).await?)
+            } else {
+                self.optional(class, register).await?
+            };
+            if let Some(value) = value {
                 words.push(RawWord { address: register.address(), code: register.row().code, value });
             }
         }

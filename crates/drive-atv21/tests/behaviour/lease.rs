@@ -79,6 +79,18 @@ async fn a_run_command_is_ours_from_before_it_is_written_until_a_stop_is_seen() 
     assert_eq!((drive.lease(), verdict(&mut drive).await), (None, None));
 }
 
+/// W:346590 of `drive-fire`: a status of no words at all was one of a motor that may coast, and confirmed a stop.
+#[tokio::test(start_paused = true)]
+async fn a_status_word_that_is_refused_tells_nothing_of_the_motor_and_confirms_no_stop() {
+    let mut words = Words::new(&CAPABILITIES, &RUNNING);
+    words.refused.insert(0xFD01, 2);
+    let mut drive = Atv21::new(words, bench::address(1));
+    assert_eq!(drive.status().await.map_err(|error| error.kind()), Err(ErrorKind::Exception));
+    for mode in [StopMode::Ramp, StopMode::DcInjection] {
+        assert!(drive.stop(mode).await.is_err(), "{mode}");
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn st_that_opens_and_closes_is_told_while_it_lasts_and_the_motor_coasts() {
     let (rig, mut drive) = running().await;
