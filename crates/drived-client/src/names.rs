@@ -127,15 +127,16 @@ fn distance(one: &str, other: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drived_plant::plant::testing::told;
+    use drived_plant::plant::{testing::told, views::GroupView};
 
     #[test]
     fn a_name_that_is_not_there_is_answered_with_the_nearest() {
         let drive = |name: &str| serde_json::from_value(told(name)).unwrap();
         let state = StateView {
             drives: ["pump 1", "pump 2", "fan 1", "stirrer"].map(drive).into(),
-            groups: vec![drived_config::config::Group {
+            groups: vec![GroupView {
                 name: "fans".to_owned(),
+                known_as: Default::default(),
                 drives: vec!["fan 1".to_owned()],
             }],
             ..StateView::default()

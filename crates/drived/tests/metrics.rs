@@ -28,7 +28,7 @@ impl Plant {
         let (mut sim, port) =
             (Sim::serve_with(name, &drives, &["--baud", "19200", "--format", "8N1"]), free_port());
         let mut text = format!(
-            "[mqtt]\nservers = [\"mqtt://127.0.0.1:1\"]\n[http]\nlisten = \"127.0.0.1:{port}\"\n[lines.bench]\nport = \"{},19200,8N1\"\n",
+            "[mqtt]\nservers = [\"mqtt://127.0.0.1:1\"]\n[[webhooks]]\nurl = \"http://127.0.0.1:1/\"\n[http]\nlisten = \"127.0.0.1:{port}\"\n[lines.bench]\nport = \"{},19200,8N1\"\n",
             sim.link()
         );
         for drive in drives {
