@@ -386,7 +386,7 @@ impl<'a> Ladder<'a> {
                 level,
                 source.span().start,
                 &format!("{what} rests on what is not sure ({})", mark.meaning()),
-                "what does the maker's manual say, on which page?",
+                "what does the maker's manual say, on which page? Its source under [sources] has mark = \"P\" then",
             );
         }
     }

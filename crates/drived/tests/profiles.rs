@@ -102,6 +102,19 @@ fn profiles_are_listed_shown_and_checked_and_a_template_asks_the_next_question()
     refused.assert_refused(2, "refused");
     assert!(refused.out.contains("colour") && refused.out.contains("write"), "{}", refused.out);
     fs::remove_file(file).expect("it is there");
+    let tried = run(&["profile", "try", "wj200", "--sim"]);
+    for words in [
+        "not that it is true",
+        "start forward: confirmed, not known whether",
+        "start reverse: confirmed",
+        "stop: confirmed",
+        "trip: it is told",
+        "reset: confirmed",
+    ] {
+        assert!(tried.assert_done().contains(words), "{words}: {}", tried.out);
+    }
+    run(&["profile", "try", "wj200", "--sim", "--person", "A. Fitter"]).assert_refused(2, "--person");
+    run(&["profile", "try", "wj200"]).assert_refused(2, "--line");
     run(&["profile", "show", "no-such-drive"]).assert_refused(2, "there is no profile");
     assert!(run(&["export", "profile-schema"]).assert_done().contains("$schema"));
 }

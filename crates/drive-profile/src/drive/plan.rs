@@ -1,6 +1,6 @@
 //! What a profile comes to once its names are resolved: which registers are read together, and what their words are worth.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use crate::format::Spanned;
 
@@ -20,24 +20,23 @@ pub(crate) struct Block {
     pub(crate) count: u16,
 }
 
-/// What was read.
+/// What was read, in the order in which it was: a few words, looked through from the last.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Words(BTreeMap<(Space, u16), u16>);
+pub(crate) struct Words(Vec<((Space, u16), u16)>);
 
 impl Words {
     /// Keeps what a block was read to hold.
     pub(crate) fn keep(&mut self, block: Block, words: impl IntoIterator<Item = u16>) {
-        for (word, at) in words.into_iter().zip(0_u16..) {
-            self.0.insert((block.space, block.first.saturating_add(at)), word);
-        }
+        let places = (0_u16..).map(|at| (block.space, block.first.saturating_add(at)));
+        self.0.extend(places.zip(words));
     }
 
     pub(crate) fn at(&self, space: Space, address: u16) -> Option<u16> {
-        self.0.get(&(space, address)).copied()
+        self.0.iter().rev().find(|(place, _)| *place == (space, address)).map(|(_, word)| *word)
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = (Space, u16, u16)> {
-        self.0.iter().map(|(&(space, address), &word)| (space, address, word))
+        self.0.iter().map(|&((space, address), word)| (space, address, word))
     }
 }
 

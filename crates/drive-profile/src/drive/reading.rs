@@ -2,7 +2,7 @@
 
 use drive_core::{
     Class, Control, Current, Direction, Evidence, Exchange, Fault, Faults, Frequency, Measurements, Output,
-    Port, RawWord, Refusal, Result, RunWord, Speed, State, Status, Told, Voltage, interned,
+    Port, RawWord, Refusal, Result, RunWord, Speed, State, Status, Told, Voltage,
     tokio_modbus::{Request, Response},
 };
 use tokio::time::Instant;
@@ -209,7 +209,9 @@ impl<P: Port> ProfileDrive<P> {
             Space::HoldingRegister => {
                 rows.iter().find(|row| row.address == address).map_or("", |row| row.code)
             }
-            _ => interned::text(&format!("{space:?}")),
+            Space::InputRegister => "InputRegister",
+            Space::Coil => "Coil",
+            Space::DiscreteInput => "DiscreteInput",
         };
         words
             .iter()

@@ -79,13 +79,19 @@ fn read_bits(
         return Err(Exception::ILLEGAL_VALUE);
     }
     let bytes = u8::try_from(count.div_ceil(8)).map_err(|_| Exception::ILLEGAL_VALUE)?;
-    let mut answer = vec![0; 2 + usize::from(bytes)];
+    let (mut answer, mut named) = (vec![0; 2 + usize::from(bytes)], false);
     for at in 0..count {
         let address = first.checked_add(at).ok_or(Exception::ILLEGAL_ADDRESS)?;
-        let bit = u8::from(machine.read_at((space, address))? != 0);
+        // A drive has more bits than its profile names, and reads those between as 0 (Hitachi WJ-C1 11-2-2).
+        let held = machine.read_at((space, address));
+        named |= held.is_ok();
+        let bit = u8::from(held.is_ok_and(|held| held != 0));
         if let Some(byte) = answer.get_mut(2 + usize::from(at / 8)) {
             *byte |= bit << (at % 8);
         }
+    }
+    if !named {
+        return Err(Exception::ILLEGAL_ADDRESS);
     }
     answer.splice(..2, [function, bytes]);
     Ok(answer)

@@ -31,6 +31,10 @@ pub(super) fn chapter(drive: &DriveTold, before: Option<&[Backup]>) -> Markup {
                 div.block { h4 { "Hours, energy, measured values" } (measured(drive)) }
                 div.block { h4 { "Communication watchdog" } (watchdog(drive)) }
             }
+            @if !drive.view.not_known.is_empty() {
+                h4 { "What nobody can know of it" }
+                ul { @for said in &drive.view.not_known { li { (said) } } }
+            }
             h4 { "Faults" }
             (faults(drive))
             @if let Some(before) = before { h4 { "Changed since the backup" } (parameters::since(drive, before)) }

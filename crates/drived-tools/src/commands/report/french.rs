@@ -69,6 +69,7 @@ const WORDS: &[(&str, &str)] = &[
     ("State now", "État actuel"),
     ("Hours, energy, measured values", "Heures, énergie, valeurs mesurées"),
     ("Communication watchdog", "Surveillance de la communication"),
+    ("What nobody can know of it", "Ce que personne ne peut en savoir"),
     ("Faults", "Défauts"),
     ("Changed since the backup", "Modifié depuis la sauvegarde"),
     ("Parameters that differ from the factory setting", "Paramètres différents du réglage usine"),

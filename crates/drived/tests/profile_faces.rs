@@ -1,0 +1,134 @@
+//! A drive from a file at every face: what it does not tell is told by none as a value, neither as zero nor as good; what is known is.
+#![cfg(unix)]
+
+#[path = "mqtt/rig.rs"]
+mod rig;
+mod support;
+
+use std::{
+    fs,
+    io::{Read as _, Write as _},
+    net::TcpStream,
+};
+
+use support::{File, Running, Sim, free_port, get, path, run};
+
+/// What a WJ200 does not tell: which of two words of its output is first was not read, so that its file has no output.
+const OWNER: &str = "whether the drive tells who commands it is not known";
+
+/// A text of a face; what has to be in it, and what must not.
+struct Row {
+    face: &'static str,
+    said: String,
+    has: &'static [&'static str],
+    lacks: &'static [&'static str],
+}
+
+#[test]
+fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_value() {
+    let broker = rig::Mosquitto::start("profile-faces");
+    let mut ear = broker.as_ref().map(|broker| broker.hear(&["drived/#"]));
+    let sim = Sim::serve_with("profile-faces", &["wj200@3"], &["--baud", "19200", "--format", "8N1"]);
+    let (http, gateway, state) = (free_port(), free_port(), path("profile-faces-state"));
+    let mqtt = broker.as_ref().map_or_else(String::new, |broker| {
+        format!("[mqtt]\nservers = [\"mqtt://127.0.0.1:{}\"]\n", broker.port)
+    });
+    let text = format!(
+        "state = \"{}\"\n{mqtt}[http]\nlisten = \"127.0.0.1:{http}\"\n[[gateways]]\nlisten = \"127.0.0.1:{gateway}\"\n\
+         [lines.bench]\nport = \"{},19200,8N1\"\n[[drives]]\nline = \"bench\"\ndrive = \"wj200@3\"\nname = \"pump\"\ncontrol = true\n\
+         options = {{ highest = \"50Hz\", commands-alone = \"yes\" }}\n",
+        state.display(),
+        sim.link()
+    );
+    let file = File::new("profile-faces", &text);
+    let socket = path("profile-faces.sock");
+    let socket = socket.to_str().expect("the path is text");
+    let mut daemon = Running::start(&["run", "--config", file.path(), "--socket", socket]);
+    daemon.wait_for(r#""event":"connected""#);
+    let started = run(&["start", "pump", "--setpoint", "20Hz", "--socket", socket]);
+    assert_eq!(started.code, Some(0), "{started:?}");
+
+    let report = path("profile-faces.html");
+    let page = report.to_str().expect("the path is text");
+    run(&["report", "--to", page, "--socket", socket]).assert_done();
+    let heard = ear.as_mut().map_or_else(String::new, |ear| {
+        let (_, state, _) = ear.until(|topic, said| topic.ends_with("/state") && said["shows"] == "running");
+        state.to_string()
+    });
+    let none: &[&str] = &[];
+    let rows = [
+        Row {
+            face: "start",
+            said: started.out + &started.err,
+            has: &["running", OWNER],
+            lacks: &["0.00 Hz:", "in force"],
+        },
+        Row {
+            face: "status",
+            said: run(&["status", "--socket", socket]).assert_done().to_owned(),
+            has: &["running", "-/20.0"],
+            lacks: none,
+        },
+        Row {
+            face: "API",
+            said: get(http, "/api/v1/drives", "application/json"),
+            has: &["not_known", OWNER, "\"verdict\":\"not_known\""],
+            lacks: &["output_frequency", "\"verdict\":\"in_force\""],
+        },
+        Row {
+            face: "metrics",
+            said: get(http, "/metrics", "text/plain"),
+            has: &["drived_drive_motor_current_amperes{line=\"bench\",drive=\"pump\"}"],
+            lacks: &["drived_drive_output_frequency_hertz{line=\"bench\",drive=\"pump\"}"],
+        },
+        Row {
+            face: "report",
+            said: fs::read_to_string(&report).expect("it was written"),
+            has: &[OWNER],
+            lacks: none,
+        },
+        Row {
+            face: "MQTT",
+            said: heard,
+            has: if broker.is_some() { &["running"] } else { none },
+            lacks: &["output_frequency", "in_force"],
+        },
+    ];
+    for Row { face, said, has, lacks } in rows {
+        for words in has {
+            assert!(said.contains(words), "{face} says nothing of {words:?}: {said}");
+        }
+        for words in lacks {
+            assert!(!said.contains(words), "{face} says {words:?}: {said}");
+        }
+    }
+    // Printed 0002, the frequency by the bus, through the gateway: 20 Hz by the hundredth.
+    assert_eq!(asked(gateway, 3, 1), [0x07, 0xD0]);
+    // What cannot be read is an exception, and no zero.
+    assert_eq!(asked(gateway, 3, 0x2000), [0x83]);
+    run(&["stop", "pump", "--socket", socket]).assert_done();
+    let (code, last) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{last}");
+    // The tools on the line, when nobody else holds it.
+    assert!(sim.on("wj200@3", &["doctor", "--for", "1s"]).out.contains("wj200@3"));
+    let backup = path("profile-faces-backup.toml");
+    let kept = sim.on("wj200@3", &["param", "backup", "--to", backup.to_str().expect("the path is text")]);
+    assert!(kept.code == Some(1) && kept.err.contains("its family has no parameters"), "{kept:?}");
+    let _ = fs::remove_file(&report);
+    let _ = fs::remove_dir_all(&state);
+}
+
+/// One holding register through a gateway: its word, or the function of the exception.
+fn asked(port: u16, slave: u8, register: u16) -> Vec<u8> {
+    let mut stream = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
+    let [high, low] = register.to_be_bytes();
+    stream.write_all(&[0, 1, 0, 0, 0, 6, slave, 3, high, low, 0, 1]).expect("it hears");
+    let mut head = [0; 8];
+    stream.read_exact(&mut head).expect("it answers");
+    if head[7] & 0x80 != 0 {
+        return vec![head[7]];
+    }
+    let mut rest = [0; 3];
+    stream.read_exact(&mut rest).expect("it answers");
+    rest[1..].to_vec()
+}
