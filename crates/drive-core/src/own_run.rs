@@ -79,8 +79,8 @@ impl Evidence {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct OwnRun {
     lease: Option<Lease>,
-    /// The one that stood when the present one was given.
-    before: Option<Lease>,
+    /// The one that stood, or might, when the present one was given, and whether it had arrived.
+    before: Option<(Lease, bool)>,
     /// Whether the drive has said that it took it. While it has not, that it does not stand says nothing: it may be on its way.
     arrived: bool,
     /// The command word that this side wrote last, whatever became of it.
@@ -142,8 +142,9 @@ impl OwnRun {
 
     /// A run command is about to be written.
     pub const fn give(&mut self, lease: Lease) {
-        if self.arrived {
-            self.before = self.lease;
+        // One of which nobody knows whether it arrived may stand as well: its answer was lost.
+        if let Some(before) = self.lease {
+            self.before = Some((before, self.arrived));
         }
         (self.lease, self.arrived) = (Some(lease), false);
     }
@@ -155,7 +156,10 @@ impl OwnRun {
 
     /// It is certain that the write did not arrive: it was never sent, or the drive has refused it.
     pub const fn was_not_written(&mut self) {
-        (self.lease, self.arrived) = (self.before, self.before.is_some());
+        (self.lease, self.arrived) = match self.before {
+            Some((before, arrived)) => (Some(before), arrived),
+            None => (None, false),
+        };
         self.before = None;
     }
 
@@ -312,6 +316,18 @@ mod tests {
         own.sends(0x0007);
         own.reads(0x0006);
         assert!(own.judge(&gone).is_some(), "that one is somebody else's");
+    }
+
+    /// Found by the model of the lease in `drive-fire`: the motor may run by the first, and nobody would have had a lease of it.
+    #[test]
+    fn a_run_command_that_never_left_leaves_the_one_before_it_whose_answer_was_lost() {
+        let mut own = OwnRun::new();
+        own.give(RUN);
+        own.give(Lease::new(Direction::Reverse, 0x080F));
+        own.was_not_written();
+        assert_eq!((own.lease(), own.has_arrived()), (Some(RUN), false));
+        assert_eq!(own.judge(&IN_FORCE), Some(Verdict::InForce), "it has come");
+        assert!(own.has_arrived());
     }
 
     #[test]
