@@ -117,7 +117,9 @@ impl Held {
         let (mut held, mut open) = (Self::default(), None::<Point>);
         points(connection, drive, quantity, start, end, |point: Point| {
             if let Some(Point { at, count: Some(count) }) = open {
-                let lasts = (point.at - at).max(0);
+                // Where nothing is known any more stands a millisecond behind what was known last.
+                let until = point.at - i64::from(point.count.is_none());
+                let lasts = (until - at).max(0);
                 held.known_ms += lasts;
                 *held.in_ms.entry(count).or_default() += lasts;
                 // What it began from has to be known: behind a gap it may have begun before.

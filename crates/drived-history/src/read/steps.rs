@@ -74,6 +74,19 @@ pub fn steps(
     Ok(steps.all.into_iter().map(told).collect())
 }
 
+/// The beginning of the hour from which on minutes of a quantity are kept.
+pub(super) fn oldest_minute_of(
+    connection: &Connection,
+    drive: &str,
+    quantity: Quantity,
+) -> Result<Option<i64>, StoreError> {
+    let mut oldest = None;
+    for source in Set::ALL.into_iter().filter_map(|set| source(connection, drive, set).transpose()) {
+        oldest = oldest.into_iter().chain(oldest_minute(connection, source?, quantity)?).min();
+    }
+    Ok(oldest)
+}
+
 fn oldest_minute(
     connection: &Connection,
     source: i64,

@@ -44,12 +44,12 @@ fn mean_around(
     if super::oldest_kept(connection, drive, quantity)?.is_some_and(|oldest| at >= oldest) {
         return Ok(None);
     }
-    for length in [MINUTE_MS, HOUR_MS] {
-        let start = at - at.rem_euclid(length);
-        let found = steps(connection, drive, quantity, start, start + length - 1, length, &|| true)?;
-        if let Some(step) = found.first() {
-            return Ok((step.known > 0.5).then_some(step.mean));
-        }
-    }
-    Ok(None)
+    // Where minutes are kept, one that is not there is a gap.
+    let length = match super::steps::oldest_minute_of(connection, drive, quantity)? {
+        Some(oldest) if oldest <= at => MINUTE_MS,
+        _ => HOUR_MS,
+    };
+    let start = at - at.rem_euclid(length);
+    let found = steps(connection, drive, quantity, start, start + length - 1, length, &|| true)?;
+    Ok(found.first().filter(|step| step.known > 0.5).map(|step| step.mean))
 }

@@ -1,5 +1,6 @@
 //! Tests of the halves together, on files.
 
+mod asked;
 mod faults;
 mod week;
 
