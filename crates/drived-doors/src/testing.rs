@@ -76,6 +76,8 @@ impl Rig {
             tokens,
             audit,
             sessions,
+            codes: crate::codes::Codes::default(),
+            page: Arc::new(OnceLock::from("http://127.0.0.1:7580/".to_owned())),
             failures,
             refused,
             pace,
