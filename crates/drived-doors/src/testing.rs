@@ -73,7 +73,6 @@ impl Rig {
         };
         let (end, ended) = watch::channel(false);
         let (sessions, failures, refused, pace, changes) = Default::default();
-        let (codes, page) = Default::default();
         let tokens = Some(Arc::new(Tokens::open(&folder.file("tokens")).unwrap()));
         let audit = Audit::open(&folder.file("audit")).unwrap();
         let gate = Arc::new(Gate {
@@ -82,8 +81,8 @@ impl Rig {
             tokens,
             audit,
             sessions,
-            codes,
-            page,
+            codes: crate::codes::Codes::default(),
+            page: Arc::new(OnceLock::from("http://127.0.0.1:7580/".to_owned())),
             failures,
             refused,
             pace,

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use drive_core::{Frequency, Motion, Setpoint, State};
+use drive_core::{Frequency, Motion, Setpoint};
 use drive_fleet::{Snapshot, has_reached};
 use serde::Serialize;
 use tokio::time::Instant;
@@ -43,9 +43,7 @@ impl Departure {
     /// Looks at what is known of the drive now; gives what is to be told, once for each time that the output leaves.
     pub(crate) fn look(&mut self, snapshot: &Snapshot) -> Option<Left> {
         let status = snapshot.status.as_ref().filter(|_| !snapshot.retracted)?;
-        let runs = status.value.state == State::Running
-            && status.value.motion == Motion::Driven
-            && snapshot.stop.is_none();
+        let runs = status.value.motion == Motion::Driven && snapshot.stop.is_none();
         let setpoint = snapshot.setpoint.filter(|_| runs);
         if setpoint.is_none() || setpoint != self.reached {
             *self = Self::default();

@@ -156,12 +156,13 @@ impl Reloader {
     }
 
     /// Changes what was added at the page, and has it hold by the way of every reload: `change` makes the new text of the old one.
-    /// The whole is read and checked before anything is written.
+    /// The whole is read and checked before anything is written. Only `ends` may end by it, and is begun anew: who is only read from then on.
     ///
     /// # Errors
     /// [`Failure::Input`]: nothing is written and nothing has changed. Others as of [`Self::reload`].
     pub(super) async fn change_added(
         &self,
+        ends: Option<String>,
         change: impl FnOnce(Option<&str>) -> Result<String, Failure> + Send + 'static,
     ) -> Result<Vec<String>, Failure> {
         let mut config = self.0.config.lock().await;
@@ -180,8 +181,11 @@ impl Reloader {
         no_new_doubt(&config, &new)?;
         // Whoever adds a drive takes none away, whatever else has become of the files since they were read.
         let all = changes(&config, &new);
-        let gone =
-            all.iter().find(|change| change.removed_drive().is_some() || change.closed_line().is_some());
+        let is_meant = |drive: &str| ends.as_deref() == Some(drive);
+        let goes = |change: &&Change| {
+            change.removed_drive().is_some_and(|drive| !is_meant(drive)) || change.closed_line().is_some()
+        };
+        let gone = all.iter().find(goes);
         if let Some(gone) = gone {
             return Err(Failure::Input(format!(
                 "the files have changed since they were read, and by them {}: drived reload first",

@@ -207,7 +207,10 @@ impl Setup for Desk {
             return Err(Failure::Input("no drive is chosen".to_owned()));
         }
         let port = wanted.line.trim().to_owned();
-        self.0.reloader.change_added(move |text| Ok(added::with_drives(text, (&line, &port), &drives))).await
+        self.0
+            .reloader
+            .change_added(None, move |text| Ok(added::with_drives(text, (&line, &port), &drives)))
+            .await
     }
 
     async fn control(&self, wanted: ControlWanted) -> Result<Vec<String>, Failure> {
@@ -217,6 +220,7 @@ impl Setup for Desk {
                 "{drive} has a run command of this daemon, or a stop that is not confirmed: it could not be stopped from here any more. Stop it first"
             )));
         }
+        let ends = (!control).then(|| drive.clone());
         let change = move |text: Option<&str>| {
             text.and_then(|text| added::with_control(text, &drive, control)).ok_or_else(|| {
                 Failure::Input(format!(
@@ -224,7 +228,7 @@ impl Setup for Desk {
                 ))
             })
         };
-        self.0.reloader.change_added(change).await
+        self.0.reloader.change_added(ends, change).await
     }
 }
 

@@ -15,6 +15,8 @@ import { whyPanel } from './why.js';
 
 const MINUTE = 60_000;
 const AROUND_MS = 5 * MINUTE;
+/** Values are written once a minute. */
+const UNWRITTEN_MS = 70_000;
 const MOVES = [-60 * MINUTE, -10 * MINUTE, -MINUTE, MINUTE, 10 * MINUTE, 60 * MINUTE];
 const SHOWN = ['output_frequency_hz', 'setpoint_hz', 'current_a', 'torque_percent'];
 
@@ -46,6 +48,7 @@ export function at(root, text) {
     const list = eventTable();
     const quiet = el('p.hint');
     let events = [];
+    if (moment > daemonNow() - UNWRITTEN_MS) root.append(el('p.remark', {}, t('past_unwritten')));
     root.append(said, el('section.panel', {}, el('h2', {}, t('at_drives')), drives, why),
       el('section.panel', {}, el('div.headline', {}, el('h2', {}, t('at_course')), el('button', { type: 'button', onclick: () => saveEvents(events) }, t('csv'))), quiet, el('div.wide', {}, list.element)),
       el('section.panel', {}, el('h2', {}, t('at_lines')), lines));

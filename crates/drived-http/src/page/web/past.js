@@ -18,6 +18,8 @@ const SPANS = { past_hour: DAY / 24, past_day: DAY, past_week: 7 * DAY, past_mon
 const STEP_S = [1, 2, 5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 21_600, 43_200, 86_400, 259_200, 604_800];
 const STEPS = 720;
 const MOST = 6;
+/** Values are written once a minute. */
+const UNWRITTEN_MS = 70_000;
 const LEAST_MS = 10_000;
 const TABLE_ROWS = 60;
 const LOOKS = [['--series-1'], ['--series-3', [7, 3]], ['--series-4', [2, 3]], ['--ink', [10, 4, 2, 4]], ['--series-2', [4, 4]], ['--focus', [1, 2]]];
@@ -130,6 +132,7 @@ export function past(root) {
     const isBack = change !== undefined && zoneAt(new Date(from)) !== zoneAt(new Date(to)) && wallText(change) < wallText(change - 60_000);
     const zones = [...new Set([zoneAt(new Date(from)), zoneAt(new Date(to))])].join(', ');
     setText(said, [t('past_zoom', { step: duration(answered.every_ms), zone: zones }),
+      to > daemonNow() - UNWRITTEN_MS && t('past_unwritten'),
       change !== undefined && t(isBack ? 'past_clock_back' : 'past_clock_forward', { time: clock(change) })].filter(Boolean).join(' '));
     known.replaceChildren(...names.map(drive => {
       const steps = answered.curves.find(curve => curve.drive === drive)?.known ?? [];

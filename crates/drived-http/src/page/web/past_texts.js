@@ -19,6 +19,7 @@ export const PAST_TEXTS = {
   past_out: ['Zoom out', 'Élargir'],
   past_now: ['Until now', 'Jusqu’à présent'],
   past_zoom: ['Drag over the curve to zoom in, click to see what happened then. Steps of {step}. Times in {zone}, by the daemon’s clock.', 'Glisser sur la courbe pour agrandir, cliquer pour voir ce qui s’est passé. Pas de {step}. Heures en {zone}, selon l’horloge du service.'],
+  past_unwritten: ['What was read in the last minute is written at its end, and is not here yet.', 'Ce qui a été lu dans la dernière minute est écrit à sa fin et n’est pas encore là.'],
   past_known: ['{drive}: known for {share} of this time', '{drive} : connu pendant {share} de ce temps'],
   past_nothing: ['{drive}: nothing is known of this time', '{drive} : rien n’est connu de ce temps'],
   past_clock_back: ['At {time} the clock was put back: times of the hour before it came twice, each is told with its own zone.', 'À {time} l’horloge a été retardée : l’heure précédente est venue deux fois, chacune est donnée avec son fuseau.'],
