@@ -215,7 +215,7 @@ fn keep_lease(own: &mut OwnRun, written: &Result<()>) {
     match written {
         Ok(()) => own.was_written(),
         Err(error) if matches!(error.kind(), ErrorKind::Exception | ErrorKind::NotSent) => {
-            own.was_not_written()
+            own.was_not_written();
         }
         Err(_) => {}
     }

@@ -13,7 +13,7 @@ use toml::{
 };
 
 use drived_config::kept::{Kept, Readers};
-use drived_words::drive_spec::DriveName;
+use drived_words::{drive_spec::DriveName, line_spec::LineSpec};
 
 /// The file of the state folder.
 pub const FILE: &str = "added.toml";
@@ -59,20 +59,31 @@ pub struct NewDrive {
     pub is_certain: bool,
 }
 
-/// The text with a line, unless it has one of this name, and these drives on it, which are only read.
-pub fn with_drives(text: Option<&str>, (line, port): (&str, &str), drives: &[NewDrive]) -> String {
+/// The text with a line, unless it has this one already, and these drives on it, which are only read.
+///
+/// # Errors
+/// It has a line of this name that goes elsewhere, or there with other settings: the drives would be others than those found.
+pub fn with_drives(
+    text: Option<&str>,
+    (line, port): (&str, &str),
+    drives: &[NewDrive],
+) -> Result<String, String> {
     let mut text = text.map_or_else(|| HEAD.to_owned(), str::to_owned);
     if !text.is_empty() && !text.ends_with('\n') {
         text.push('\n');
     }
-    let line = quoted(line);
-    let is_there = DeTable::parse(&text).is_ok_and(|tables| {
-        let lines = tables.get_ref().get("lines").and_then(|lines| lines.get_ref().as_table());
-        lines.is_some_and(|lines| lines.keys().any(|name| quoted(name.get_ref()) == line))
-    });
-    if !is_there {
-        let _ = write!(text, "\n[lines.{line}]\nport = {}\n", quoted(port));
+    match port_of(&text, line) {
+        None => {
+            let _ = write!(text, "\n[lines.{}]\nport = {}\n", quoted(line), quoted(port));
+        }
+        Some(there) if is_same(&there, port) => {}
+        Some(there) => {
+            return Err(format!(
+                "line {line:?} is there already and goes to {there}: these drives answer at {port}; give their line another name"
+            ));
+        }
     }
+    let line = quoted(line);
     for NewDrive { drive, name, is_certain } in drives {
         let known = if *is_certain { "By its own words." } else { "A GUESS: see its nameplate." };
         let _ = write!(
@@ -83,7 +94,19 @@ pub fn with_drives(text: Option<&str>, (line, port): (&str, &str), drives: &[New
             quoted(name)
         );
     }
-    text
+    Ok(text)
+}
+
+/// Whether two ports are one, with the same settings, however they are written.
+fn is_same(one: &str, other: &str) -> bool {
+    one.parse::<LineSpec>().is_ok_and(|one| other.parse() == Ok(one))
+}
+
+/// Where a line of the text goes; empty: it does not say so by itself.
+fn port_of(text: &str, line: &str) -> Option<String> {
+    let tables = DeTable::parse(text).ok()?;
+    let table = tables.get_ref().get("lines")?.get_ref().as_table()?.get(line)?.get_ref().as_table();
+    Some(table.and_then(|table| text_of(table.get("port")?)).unwrap_or_default().to_owned())
 }
 
 /// The text with another word for whether a drive takes commands; everything else stays as it stands. `None`: no entry of the file is
@@ -132,11 +155,11 @@ mod tests {
     #[test]
     fn what_is_added_is_only_read_and_stands_below_what_was_there() {
         let line = ("hall \"2\"", "/dev/ttyUSB0,19200,8E1");
-        let first = with_drives(None, line, &[drive(1, "pump")]);
+        let first = with_drives(None, line, &[drive(1, "pump")]).unwrap();
         assert!(
             first.starts_with("# Drives that were added at the page") && first.contains("By its own words.")
         );
-        let both = with_drives(Some(&first), line, &[drive(2, "Lüfter = 2")]);
+        let both = with_drives(Some(&first), line, &[drive(2, "Lüfter = 2")]).unwrap();
         assert!(both.starts_with(&first) && both.contains("A GUESS"), "{both}");
         let read: toml::Table = both.parse().unwrap();
         assert_eq!(read["lines"].as_table().unwrap().len(), 1);
@@ -145,6 +168,18 @@ mod tests {
         assert_eq!(drives[1]["name"].as_str(), Some("Lüfter = 2"));
         assert_eq!(drives[1]["drive"].as_str(), Some("atv312@2"));
         assert!(drives.iter().all(|drive| drive["control"].as_bool() == Some(false)));
+    }
+
+    #[test]
+    fn a_drive_is_never_added_to_another_line_than_that_on_which_it_was_found() {
+        let (a, b) = ("/dev/ttyUSB0,19200,8E1", "/dev/ttyUSB1,19200,8E1");
+        let first = with_drives(None, ("main", a), &[drive(1, "pump")]).unwrap();
+        for elsewhere in [b, "/dev/ttyUSB0,9600,8E1"] {
+            let why = with_drives(Some(&first), ("main", elsewhere), &[drive(2, "fan")]).unwrap_err();
+            assert!(why.contains(a) && why.contains("another name"), "{why}");
+        }
+        let two = with_drives(Some(&first), ("hall", b), &[drive(2, "fan")]).unwrap();
+        assert!(with_drives(Some(&two), ("main", a), &[drive(3, "mixer")]).is_ok());
     }
 
     #[test]

@@ -126,6 +126,20 @@ pub(super) fn ports(source: Source<'_>, raw: &file::File, lines: &[LinePart]) ->
     Ok(())
 }
 
+/// Whether two lines would talk into each other, by whatever names they are called: one serial port, or one server. A name of a
+/// server is looked up: it may take a while.
+#[must_use]
+pub fn is_one_wire(one: &Endpoint, other: &Endpoint) -> bool {
+    match (one, other) {
+        (Endpoint::Serial(one), Endpoint::Serial(other)) => Wire::serial(one) == Wire::serial(other),
+        (Endpoint::Tcp(one), Endpoint::Tcp(other)) => {
+            let mut hosts = Hosts::default();
+            hosts.of(one) == hosts.of(other)
+        }
+        _ => false,
+    }
+}
+
 /// What only one line can have.
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Wire {

@@ -24,8 +24,8 @@ use toml::{
     de::{DeTable, Deserializer},
 };
 
-pub use self::file::without;
 use self::{added::Added, file::File};
+pub use self::{checks::is_one_wire, file::without};
 use drived_config::config::{
     ConfigError, DriveEntry, Entry as _, Environment, Group, Key, LineEntries, LineEntry, LinePart, Members,
     Source, State, groups, line_part, look_alikes, of,

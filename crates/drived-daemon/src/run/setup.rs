@@ -11,7 +11,10 @@ use tokio::{runtime::Handle, sync::oneshot};
 
 use super::reload::Reloader;
 use drived_config::config::look_alikes;
-use drived_file::added::{self, NewDrive};
+use drived_file::{
+    added::{self, NewDrive},
+    is_one_wire,
+};
 use drived_http::api::setup::{
     AlikeView, ControlWanted, DrivesWanted, FamilyView, FoundView, PortView, ScanState, ScanView, ScanWanted,
     Setup, SetupView,
@@ -114,9 +117,19 @@ impl Desk {
             let name =
                 spec.single().ok_or_else(|| Failure::Input(format!("{:?} is no family", drive.family)))?;
             let is_it = |found: &&FoundView| found.address == drive.address && found.line == wanted.line;
-            let is_certain = found.iter().filter(is_it).flat_map(|found| &found.families);
-            let is_certain =
-                is_certain.into_iter().any(|alike| alike.certain && alike.family == drive.family);
+            let mut certain = found.iter().filter(is_it).flat_map(|found| &found.families).filter(|alike| alike.certain);
+            let is_certain = match certain.clone().any(|alike| alike.family == drive.family) {
+                true => true,
+                false => match certain.next() {
+                    Some(other) => {
+                        return Err(Failure::Input(format!(
+                            "the drive at address {} says itself that it is {}: by the registers of {} it would be misunderstood",
+                            drive.address, other.family, drive.family
+                        )));
+                    }
+                    None => false,
+                },
+            };
             Ok(NewDrive { drive: name, name: drive.name.trim().to_owned(), is_certain })
         });
         drives.collect()
@@ -147,35 +160,42 @@ impl Setup for Desk {
         let line: LineSpec = wanted.line.trim().parse().map_err(input)?;
         let endpoint = endpoint(&line)?;
         let addresses: Addresses = wanted.addresses.as_deref().unwrap_or(ALL).parse().map_err(input)?;
-        if let Some((line, _)) =
-            self.0.reloader.holds().await.lines.iter().find(|(_, other)| is_same(other, &endpoint))
-        {
-            return Err(Failure::Input(format!(
-                "this is the port of line {line:?}, whose drives are asked there already: a scan would disturb them"
-            )));
-        }
         let (tell, given_up) = oneshot::channel();
-        let mut scan = self.scan();
-        if scan.as_ref().is_some_and(Scan::is_under_way) {
-            return Err(Failure::Input("another scan is under way: give it up first".to_owned()));
+        let before = {
+            let mut scan = self.scan();
+            if scan.as_ref().is_some_and(Scan::is_under_way) {
+                return Err(Failure::Input("another scan is under way: give it up first".to_owned()));
+            }
+            scan.replace(Scan {
+                view: ScanView {
+                    line: wanted.line.trim().to_owned(),
+                    state: ScanState::Listening,
+                    done: 0,
+                    steps: 0,
+                    takes_ms: 0,
+                    setting: None,
+                    address: None,
+                    found: Vec::new(),
+                    doubts: Vec::new(),
+                    why: None,
+                },
+                endpoint: endpoint.clone(),
+                given_up: Some(tell),
+            })
+        };
+        // The port is claimed first: who adds a line meanwhile sees the claim, or is seen.
+        let lines = self.0.reloader.holds().await.lines;
+        let is_taken = move || lines.into_iter().find(|(_, other)| is_one_wire(other, &endpoint));
+        let taken = tokio::task::spawn_blocking(is_taken).await;
+        if let Some(why) = match taken {
+            Ok(taken) => taken.map(|(line, _)| {
+                format!("this is the port of line {line:?}, whose drives are asked there already: a scan would disturb them")
+            }),
+            Err(error) => Some(error.to_string()),
+        } {
+            *self.scan() = before;
+            return Err(Failure::Input(why));
         }
-        *scan = Some(Scan {
-            view: ScanView {
-                line: wanted.line.trim().to_owned(),
-                state: ScanState::Listening,
-                done: 0,
-                steps: 0,
-                takes_ms: 0,
-                setting: None,
-                address: None,
-                found: Vec::new(),
-                doubts: Vec::new(),
-                why: None,
-            },
-            endpoint,
-            given_up: Some(tell),
-        });
-        drop(scan);
         let wanted = Wanted { line, addresses, standstill: wanted.standstill };
         // It opens its port again and again, and moves from no thread to another meanwhile.
         let (desk, runtime) = (self.clone(), Handle::current());
@@ -192,12 +212,6 @@ impl Setup for Desk {
     async fn add(&self, wanted: DrivesWanted) -> Result<Vec<String>, Failure> {
         let spec: LineSpec = wanted.line.trim().parse().map_err(input)?;
         let endpoint = endpoint(&spec)?;
-        if self.scan().as_ref().is_some_and(|scan| scan.is_under_way() && is_same(&scan.endpoint, &endpoint))
-        {
-            return Err(Failure::Input(
-                "this port is being scanned: wait for it, or give the scan up".to_owned(),
-            ));
-        }
         let line = wanted.name.trim().to_owned();
         if let Some(oddity) = look_alikes::oddity(&line) {
             return Err(Failure::Input(format!("the name of the line {oddity}")));
@@ -206,11 +220,18 @@ impl Setup for Desk {
         if drives.is_empty() {
             return Err(Failure::Input("no drive is chosen".to_owned()));
         }
-        let port = wanted.line.trim().to_owned();
-        self.0
-            .reloader
-            .change_added(None, move |text| Ok(added::with_drives(text, (&line, &port), &drives)))
-            .await
+        let (desk, port) = (self.clone(), wanted.line.trim().to_owned());
+        // Asked where nothing else can change any more, and on a thread that may wait for a name.
+        let change = move |text: Option<&str>| {
+            let scanned =
+                desk.scan().as_ref().filter(|scan| scan.is_under_way()).map(|scan| scan.endpoint.clone());
+            if scanned.is_some_and(|scanned| is_one_wire(&scanned, &endpoint)) {
+                let why = "this port is being scanned: wait for it, or give the scan up";
+                return Err(Failure::Input(why.to_owned()));
+            }
+            added::with_drives(text, (&line, &port), &drives).map_err(Failure::Input)
+        };
+        self.0.reloader.change_added(None, change).await
     }
 
     async fn control(&self, wanted: ControlWanted) -> Result<Vec<String>, Failure> {
@@ -244,16 +265,6 @@ fn endpoint(line: &LineSpec) -> Result<Endpoint, Failure> {
     }
 }
 
-/// Whether two are one port, by whatever name.
-fn is_same(one: &Endpoint, other: &Endpoint) -> bool {
-    match (one, other) {
-        (Endpoint::Serial(one), Endpoint::Serial(other)) => {
-            one == other || one.canonicalize().ok().is_some_and(|one| other.canonicalize().ok() == Some(one))
-        }
-        _ => one == other,
-    }
-}
-
 /// The ports that are there, each once, by the name that it keeps.
 fn present(taken: &[(String, Endpoint)]) -> Vec<PortView> {
     let mut known = Vec::new();
@@ -264,7 +275,8 @@ fn present(taken: &[(String, Endpoint)]) -> Vec<PortView> {
             continue;
         }
         let endpoint = Endpoint::Serial(PathBuf::from(&path));
-        let line = taken.iter().find(|(_, other)| is_same(other, &endpoint)).map(|(line, _)| line.clone());
+        let line =
+            taken.iter().find(|(_, other)| is_one_wire(other, &endpoint)).map(|(line, _)| line.clone());
         let told =
             device.as_ref().map(|device| device.display().to_string()).filter(|device| *device != path);
         known.push(device);

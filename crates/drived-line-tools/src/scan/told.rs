@@ -75,7 +75,7 @@ pub struct Alike {
 /// Scans until every address was asked or `given_up` ends; gives whether every address was asked. Nothing is written.
 ///
 /// # Errors
-/// The port cannot be opened, or what is wanted cannot be scanned.
+/// The port cannot be opened, what is wanted cannot be scanned, or another master is heard: nothing is asked then.
 pub async fn told(
     wanted: Wanted,
     mut tell: impl FnMut(News),
@@ -99,10 +99,11 @@ pub async fn told(
     let mut given_up = std::pin::pin!(given_up);
     let mut sweep = Sweep::new(&plan, line.clone(), WAIT, own_line::open_line);
     tokio::select! {
-        heard = listen_first(&line) => {
-            sweep.is_shared = heard.is_some();
-            heard.map(News::Doubt).into_iter().for_each(&mut tell);
-        }
+        // Nobody stands beside it with a hand at the key: into another master's questions nothing is asked.
+        heard = listen_first(&line) => if let Some(another) = heard {
+            sweep.close().await;
+            return Err(Failure::Input(another));
+        },
         () = &mut given_up => return Ok(false),
     }
     let mut only = None;
