@@ -47,6 +47,18 @@ const FAMILIES: [Family; 5] = [
     Family { drive: "3g3ev@5", unit: 5, frequency: (0x0024, 0.1), current: Some((0x0027, 0.1)) },
 ];
 
+/// A slow value: its place among the families; its register, and how much a count is; as the API, as Prometheus with how much of the API's unit
+/// its own is, and as Sparkplug has it.
+type Slow = (usize, (u16, f64), &'static str, (&'static str, f64), &'static str);
+
+/// ATV312: BBV51701 p. 21, 3207 ULn 0.1 V; ATV28: p. 57 there, W454 ULn 0.1 V; ATV21: §8.3, FE04 in 0.01 %; 3G3EV: §5.2, 0031h in V.
+const SLOW: [Slow; 4] = [
+    (0, (3_207, 0.1), "line_voltage_v", ("line_voltage_volts", 1.0), "Line Voltage"),
+    (1, (454, 0.1), "line_voltage_v", ("line_voltage_volts", 1.0), "Line Voltage"),
+    (3, (0xFE04, 0.01), "dc_bus_voltage_percent", ("bus_voltage_ratio", 100.0), "DC Bus Voltage Share"),
+    (4, (0x0031, 1.0), "dc_bus_voltage_v", ("bus_voltage_volts", 1.0), "DC Bus Voltage"),
+];
+
 /// What somebody says of a drive. Frequency and current in hundredths, so that they are the same or not.
 #[derive(Debug, Clone, PartialEq)]
 struct Said {
@@ -345,6 +357,46 @@ impl Plant {
         }
     }
 
+    /// Waits until every face says of a slow value what the drive says itself.
+    fn agree_on_slow(&mut self, &(place, (register, count), key, (metric, unit), name): &Slow) {
+        let family = &FAMILIES[place];
+        let short = family.drive.split('@').next().unwrap_or_default();
+        let (id, end) = (format!("the {short}"), Instant::now() + PATIENCE);
+        loop {
+            let itself =
+                self.words(family.unit, register, 1).map(|words| hundredths(f64::from(words[0]) * count));
+            let state: Value =
+                serde_json::from_str(&get(self.http, "/api/v1/state", "*/*")).expect("it is JSON");
+            let drives = state["drives"].as_array().expect("a list");
+            let drive = drives.iter().find(|drive| drive["id"] == *id).cloned().unwrap_or_default();
+            let api = drive["measurements"][key].as_f64().map(hundredths);
+            let (port, topic) =
+                (self.broker.port.to_string(), format!("drived/drive/the_{short}/measurements"));
+            let told = Command::new("mosquitto_sub")
+                .args(["-V", "5", "-p", &port, "-t", &topic, "-C", "1", "-W", "3"])
+                .output()
+                .expect("it comes with mosquitto");
+            let told: Value = serde_json::from_slice(&told.stdout).unwrap_or_default();
+            let mqtt = told[key].as_f64().map(hundredths);
+            let all = self.host.ask();
+            let sparkplug = all[&id][format!("Measurements/{name}")][0].as_f64().map(hundredths);
+            let text = get(self.http, "/metrics", "*/*");
+            let series = format!("drived_drive_{metric}{{line=\"bench\",drive=\"{id}\"}} ");
+            let scraped = text.lines().find_map(|line| line.strip_prefix(&series)?.parse::<f64>().ok());
+            let prometheus = scraped.map(|value| hundredths(value * unit));
+            if itself.is_some() && [api, mqtt, sparkplug, prometheus].iter().all(|said| *said == itself) {
+                let value = itself.unwrap_or_default() as f64 / 100.0;
+                println!(
+                    "| they run | {} | {key} {value}: the same of API, MQTT, Sparkplug and Prometheus |||||",
+                    family.drive
+                );
+                return;
+            }
+            let said = [("API", api), ("MQTT", mqtt), ("Sparkplug", sparkplug), ("Prometheus", prometheus)];
+            assert!(Instant::now() < end, "{id} says {key} {itself:?}: {said:?}");
+        }
+    }
+
     fn all_agree(&mut self, step: &str, states: [Option<&str>; 5]) {
         for (place, state) in states.into_iter().enumerate() {
             self.agree(step, place, state);
@@ -394,6 +446,9 @@ fn every_face_tells_what_the_drives_say_while_they_move_trip_are_renamed_lost_an
         plant.start_motor(name, hertz);
     }
     plant.all_agree("they run", [Some("running"); 5]);
+    for slow in &SLOW {
+        plant.agree_on_slow(slow);
+    }
 
     // Another name: the same device, series, topic and place. Its motor, started here, was stopped as the drive of the old name left.
     plant.names[1] = "the mixer".to_owned();

@@ -78,8 +78,9 @@ impl Commanding {
                 self.handle_alarms(write, doubt, timestamp, arrived);
                 continue;
             };
-            // The drive that it is now; whom it does not know the desk refuses by what was said.
-            let drive = self.plant.name_of(Kind::Drive, &device).unwrap_or_else(|| device.clone());
+            // The drive that it is now; of one that is gone the name may be another's by now.
+            let drive = self.plant.name_of(Kind::Drive, &device);
+            let drive = drive.unwrap_or_else(|| format!("{device}, which is gone"));
             self.desk.take(Message {
                 needs_id: matches!(&write, Ok(write) if write.name == COMMAND),
                 doubt: read_only(&write).or(doubt),
