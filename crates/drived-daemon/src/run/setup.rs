@@ -114,9 +114,8 @@ impl Desk {
             let name =
                 spec.single().ok_or_else(|| Failure::Input(format!("{:?} is no family", drive.family)))?;
             let is_it = |found: &&FoundView| found.address == drive.address && found.line == wanted.line;
-            let is_certain = found.iter().filter(is_it).flat_map(|found| &found.families);
-            let is_certain =
-                is_certain.into_iter().any(|alike| alike.certain && alike.family == drive.family);
+            let mut alike = found.iter().filter(is_it).flat_map(|found| &found.families);
+            let is_certain = alike.any(|alike| alike.certain && alike.family == drive.family);
             Ok(NewDrive { drive: name, name: drive.name.trim().to_owned(), is_certain })
         });
         drives.collect()
