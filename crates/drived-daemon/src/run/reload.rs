@@ -142,7 +142,7 @@ impl Reloader {
 impl Reloader {
     /// What holds now, as far as the first hour asks.
     pub(super) async fn holds(&self) -> Here {
-        Here::of(&self.0.file, &self.0.config.lock().await)
+        Here::of(&self.0.file, &*self.0.config.lock().await)
     }
 
     /// Whether this daemon has something to end at a drive: a run of its own, or a stop.
