@@ -117,19 +117,16 @@ impl Desk {
             let name =
                 spec.single().ok_or_else(|| Failure::Input(format!("{:?} is no family", drive.family)))?;
             let is_it = |found: &&FoundView| found.address == drive.address && found.line == wanted.line;
-            let mut certain = found.iter().filter(is_it).flat_map(|found| &found.families).filter(|alike| alike.certain);
-            let is_certain = match certain.clone().any(|alike| alike.family == drive.family) {
-                true => true,
-                false => match certain.next() {
-                    Some(other) => {
-                        return Err(Failure::Input(format!(
-                            "the drive at address {} says itself that it is {}: by the registers of {} it would be misunderstood",
-                            drive.address, other.family, drive.family
-                        )));
-                    }
-                    None => false,
-                },
-            };
+            let alike = found.iter().filter(is_it).flat_map(|found| &found.families);
+            let certain: Vec<&str> =
+                alike.filter(|alike| alike.certain).map(|alike| &*alike.family).collect();
+            let is_certain = certain.contains(&&*drive.family);
+            if let (false, [says, ..]) = (is_certain, &*certain) {
+                return Err(Failure::Input(format!(
+                    "the drive at address {} says itself that it is {says}: it is not read as {}",
+                    drive.address, drive.family
+                )));
+            }
             Ok(NewDrive { drive: name, name: drive.name.trim().to_owned(), is_certain })
         });
         drives.collect()
