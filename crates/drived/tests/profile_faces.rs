@@ -61,7 +61,7 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
             face: "start",
             said: started.out + &started.err,
             has: &["running", OWNER],
-            lacks: &["0.00 Hz:", "in force"],
+            lacks: &[" 0.00 Hz", "is in force"],
         },
         Row {
             face: "status",
@@ -112,8 +112,9 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
     // The tools on the line, when nobody else holds it.
     assert!(sim.on("wj200@3", &["doctor", "--for", "1s"]).out.contains("wj200@3"));
     let backup = path("profile-faces-backup.toml");
-    let kept = sim.on("wj200@3", &["param", "backup", "--to", backup.to_str().expect("the path is text")]);
-    assert!(kept.code == Some(1) && kept.err.contains("its family has no parameters"), "{kept:?}");
+    let (backup, line) = (backup.to_str().expect("the path is text"), format!("{},19200,8N1", sim.link()));
+    let kept = run(&["param", "backup", "--to", backup, "--line", &line, "wj200@3"]);
+    assert!(kept.code != Some(0) && kept.err.contains("its family has no parameters"), "{kept:?}");
     let _ = fs::remove_file(&report);
     let _ = fs::remove_dir_all(&state);
 }

@@ -31,6 +31,8 @@ pub struct ProfileDrive<P> {
     profile: Arc<Profile>,
     fast: Vec<Block>,
     slow: Vec<Block>,
+    /// What reads the code of the present fault, where no status does.
+    code: Option<Block>,
     owner: Owner,
     watch: Watch,
     guarded: Guarded,
@@ -51,7 +53,7 @@ impl<P: Port> ProfileDrive<P> {
     #[must_use]
     pub fn new(port: P, slave: SlaveAddress, profile: Arc<Profile>, owner: Owner) -> Self {
         let registers = Registers::new(port, slave, profile.capabilities(), meaning);
-        let (fast, slow) = (profile.fast(), profile.slow());
+        let (fast, slow, code) = (profile.fast(), profile.slow(), profile.code());
         let guarded = Guarded::of(&profile);
         let watch = Watch::default();
         Self {
@@ -59,6 +61,7 @@ impl<P: Port> ProfileDrive<P> {
             profile,
             fast,
             slow,
+            code,
             owner,
             watch,
             guarded,

@@ -101,9 +101,7 @@ impl Profile {
         let mut names: BTreeSet<&str> = BTreeSet::new();
         names.extend(file.state.is.iter().map(|is| name(&is.get_ref().bits.get_ref().register)));
         let see = &file.see;
-        names.extend(
-            [&see.output, &see.setpoint, &see.current, &file.faults.present].into_iter().filter_map(given),
-        );
+        names.extend([&see.output, &see.setpoint, &see.current].into_iter().filter_map(given));
         names.extend(see.direction.given().map(|direction| name(&direction.get_ref().register)));
         let told =
             [&see.at_setpoint, &see.warning, &file.state.standstill].into_iter().filter_map(Answer::given);
@@ -112,7 +110,23 @@ impl Profile {
             [&file.ownership.command, &file.ownership.reference].into_iter().filter_map(Answer::given);
         names.extend(owners.map(|owner| name(&owner.get_ref().bits.register)));
         names.extend(file.ownership.reads_back.given().map(|read| name(&read.get_ref().register)));
-        self.blocks(&names)
+        let blocks = self.blocks(&names);
+        // The code of a fault is read along where it costs no exchange; else once there is a fault.
+        names.extend(given(&file.faults.present));
+        let with_code = self.blocks(&names);
+        if with_code.len() == blocks.len() { with_code } else { blocks }
+    }
+
+    /// What reads the code of the present fault, where a status does not.
+    pub(crate) fn code(&self) -> Option<Block> {
+        let name = given(&self.file.faults.present)?;
+        let (_, space, address) = self.place_of(name)?;
+        let holds = |block: &Block| {
+            let at = address.checked_sub(block.first);
+            block.space == space && at.is_some_and(|at| at < block.count)
+        };
+        let block = Block { space, first: address, count: 1 };
+        (!self.fast().iter().any(holds)).then_some(block)
     }
 
     /// The register that a write by function 23 reads along: the first that tells the state.
@@ -156,19 +170,30 @@ impl Profile {
         let across = link.reads_across.given() == Some(&true);
         let mut blocks: Vec<Block> = Vec::new();
         for (space, first) in singles {
-            match blocks.last_mut() {
-                Some(last)
-                    if (across || seconds.contains(&(space, first)))
-                        && last.space == space
-                        && last.count < most(space)
-                        && last.first.checked_add(last.count) == Some(first) =>
-                {
-                    last.count += 1;
-                }
-                _ => blocks.push(Block { space, first, count: 1 }),
+            let joins = |last: &Block| {
+                let count = first.checked_sub(last.first)?.checked_add(1)?;
+                let next = last.first.saturating_add(last.count);
+                let is_next = first == next && (across || seconds.contains(&(space, first)));
+                // What lies between is read along, where the file names it and the drive lets it be read.
+                let bridges = across && (next..first).all(|between| self.is_readable(space, between));
+                (last.space == space && count <= most(space) && (is_next || bridges)).then_some(count)
+            };
+            match blocks.last().and_then(joins).zip(blocks.last_mut()) {
+                Some((count, last)) => last.count = count,
+                None => blocks.push(Block { space, first, count: 1 }),
             }
         }
         blocks
+    }
+
+    /// Whether the file names a register of one word there that can be read.
+    fn is_readable(&self, space: Space, address: u16) -> bool {
+        let is_it = |register: &Register| {
+            self.file.place(register) == Some((space, address))
+                && register.access != Access::Write
+                && !is_double(register)
+        };
+        self.file.register.values().any(|register| is_it(register.get_ref()))
     }
 }
 

@@ -65,8 +65,16 @@ impl<P: Port> ProfileDrive<P> {
     /// A status. What it says of the run command ends nothing: see [`judge`](Self::judge).
     pub(super) async fn read_status(&mut self, class: Class) -> Result<(Status, Words)> {
         let blocks = self.fast.clone();
-        let words = self.read_blocks(class, &blocks).await?;
+        let mut words = self.read_blocks(class, &blocks).await?;
         let mut status = self.explain(&words);
+        if let Some(block) = self.code.filter(|_| status.is_fault()) {
+            // That it has tripped is told in any case.
+            if let Ok(read) = self.read_block(class, block).await {
+                words.keep(block, read);
+                status.fault_code = see_code(&self.profile, &words).filter(|code| *code != 0);
+                status.raw = self.raw(&words);
+            }
+        }
         let shown = self.shown(&status);
         status.motion = self.watch.see(Instant::now(), shown, status.output_frequency);
         let evidence = self.evidence(&status, &words);
@@ -207,7 +215,8 @@ impl<P: Port> ProfileDrive<P> {
         let rows = self.registers.capabilities().rows;
         let code = |space, address| match space {
             Space::HoldingRegister => {
-                rows.iter().find(|row| row.address == address).map_or("", |row| row.code)
+                let row = rows.binary_search_by_key(&address, |row| row.address).ok();
+                row.and_then(|at| rows.get(at)).map_or("", |row| row.code)
             }
             Space::InputRegister => "InputRegister",
             Space::Coil => "Coil",
