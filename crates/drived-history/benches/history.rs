@@ -142,8 +142,10 @@ fn writing() -> f64 {
 /// Bytes of each table and index.
 fn sizes(connection: &Connection) -> Vec<(String, u64)> {
     let mut find = connection.prepare("SELECT name, sum(pgsize) FROM dbstat GROUP BY name").unwrap();
-    let rows = find.query_map([], |row| Ok((row.get(0)?, row.get(1)?))).unwrap();
-    rows.map(Result::unwrap).collect()
+    let rows = find.query_map([], |row| Ok((row.get::<_, String>(0)?, row.get::<_, i64>(1)?))).unwrap();
+    let of =
+        |row: rusqlite::Result<(String, i64)>| row.map(|(name, size)| (name, size.unsigned_abs())).unwrap();
+    rows.map(of).collect()
 }
 
 /// 31 drives through 91 days, one value of each, and what becomes of ten years.

@@ -197,10 +197,13 @@ fn of_silence(facts: &Facts, at: i64) -> Vec<Sentence> {
             said.extend(of_loss(facts, lost));
             said
         }
-        None => vec![Sentence::of(
-            NotKnown,
-            "why it heard no message for so long is not known: nothing of it was seen from here",
-        )],
+        None => vec![match facts.missing(at - SILENT_MS, at).filter(|why| why.starts_with("this program")) {
+            Some(why) => Sentence::of(Likely, format!("{why}, so that nobody here spoke to it")),
+            None => Sentence::of(
+                NotKnown,
+                "why it heard no message for so long is not known: nothing of it was seen from here",
+            ),
+        }],
     }
 }
 

@@ -386,3 +386,17 @@ fn an_output_that_left_its_setpoint_without_a_command_is_a_fact_with_what_may_be
     assert!(story.why(Certainty::Seen).contains("nobody here asked for it"), "{story:?}");
     assert!(story.why(Certainty::NotKnown).contains("a limit of current or torque"), "{story:?}");
 }
+
+#[test]
+fn a_watchdog_that_acted_while_this_program_was_dead_is_told_by_that() {
+    let mut night = Written::begin("dead");
+    night.event(200_000, "connected", "connected: running", None);
+    night.killed_until(300_000);
+    let found = serde_json::json!({ "fault": { "by_watchdog": true, "found": true } });
+    let text = "tripped, found so by its communication watchdog: 5 SLF: Modbus communication interruption";
+    night.event(301_000, "tripped", text, Some(found));
+    let story = night.told(301_000);
+    let likely = story.why(Certainty::Likely);
+    assert!(likely.contains("this program had been killed, so that nobody here spoke to it"), "{story:?}");
+    assert!(story.why(Certainty::NotKnown).contains("when that happened is not known"), "{story:?}");
+}

@@ -22,7 +22,7 @@ use drived_words::{
     duration::Time,
     failure::Failure,
     line_spec::{self, LineSpec},
-    output::{self, JsonArgs},
+    output::{self, JsonArgs, Table},
 };
 
 /// Calculate lines before the cable is pulled: cycle, age of values, load, worst stop, watchdogs
@@ -58,8 +58,15 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
+    let mut kept = Vec::new();
     let (lines, problems) = match (&args.config, &args.line) {
-        (Some(file), _) => of_file(Config::load(file).map_err(|error| Failure::Input(error.to_string()))?),
+        (Some(file), _) => {
+            let config = Config::load(file).map_err(|error| Failure::Input(error.to_string()))?;
+            if let Some(history) = config.face("history") {
+                kept = history.meaning();
+            }
+            of_file(config)
+        }
         (None, Some(line)) => args.described(line)?,
         (None, None) => {
             return Err(Failure::Input("expected --config FILE, or --line and --drive".to_owned()));
@@ -88,6 +95,15 @@ pub fn run(args: &Args) -> Result<(), Failure> {
          still needs its ramp.",
     )?;
     problems.try_for_each(output::say)?;
+    // How large the history becomes belongs to what is known beforehand.
+    for kept in kept {
+        output::say(format_args!("\n{}", kept.head))?;
+        let mut table = Table::texts();
+        for (label, text) in kept.rows {
+            table.row([format!("  {label}"), text]);
+        }
+        output::say_table(table)?;
+    }
     refused
 }
 

@@ -33,7 +33,7 @@ pub(crate) fn drawn(steps: &[Step], bounds: [f64; 2], every: f64, ends: [String;
     for step in steps {
         match (strokes.last_mut(), last) {
             (Some(stroke), Some(last)) if step.place - last <= every * 1.5 => {
-                stroke.push((step.place, step.mean))
+                stroke.push((step.place, step.mean));
             }
             _ => strokes.push(vec![(step.place, step.mean)]),
         }
