@@ -44,7 +44,7 @@ impl<P: Port> Drive3g3ev<P> {
         match sent {
             Ok(()) => self.watch.run.was_written(),
             // What was refused may be a repetition of what was carried out.
-            Err(error @ Error::Exception { .. }) => {
+            Err(error) if error.kind() == ErrorKind::Exception => {
                 if self.read_command(Class::Command).await.map_err(Error::after_write)?.value != word.bits() {
                     self.watch.run.was_not_written();
                     return Err(error);

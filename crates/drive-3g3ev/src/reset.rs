@@ -1,6 +1,6 @@
 //! The fault reset of one drive: a pulse of the input that carries it.
 
-use drive_core::{Class, Command as Order, Confirming, Error, Port, Result, Status};
+use drive_core::{Class, Command as Order, Confirming, Error, ErrorKind, Port, Result, Status};
 
 use crate::{
     Drive3g3ev,
@@ -35,12 +35,10 @@ impl<P: Port> Drive3g3ev<P> {
         self.watch.run.sends(clear.bits());
         // Sent once; whatever becomes of it, the bit is cleared again.
         let pulse = self.registers.at(Class::Command).edge().write(COMMAND, (clear | input).bits()).await;
-        match pulse {
-            Err(Error::Port { problem, exchange, slave }) if problem.nothing_sent() => {
-                return Err(Error::Port { problem, exchange, slave });
-            }
-            Err(error @ Error::Exception { .. }) => return Err(error),
-            _ => {}
+        if let Err(error) = &pulse
+            && matches!(error.kind(), ErrorKind::NotSent | ErrorKind::Exception)
+        {
+            return Err(error.clone());
         }
         self.see_reset(pulse, clear).await.map_err(Error::after_write)
     }

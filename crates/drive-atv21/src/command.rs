@@ -68,7 +68,7 @@ impl<P: Port> Atv21<P> {
         match sent {
             Ok(()) => self.watch.run.was_written(),
             // What was refused may be a repetition of what was carried out, and a block in doubt is read back.
-            Err(error @ Error::Exception { .. }) => {
+            Err(error) if error.kind() == ErrorKind::Exception => {
                 if self.command_word(Class::Command).await.map_err(Error::after_write)? != word {
                     self.watch.run.was_not_written();
                     return Err(error);
