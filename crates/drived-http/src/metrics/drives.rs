@@ -9,19 +9,6 @@ use tokio::time::Instant;
 use super::{samples::Samples, table::Id};
 use drived_words::json::unix;
 
-/// Every state, so that those a drive is not in are told too.
-const STATES: [State; 9] = [
-    State::NotReady,
-    State::Disabled,
-    State::Ready,
-    State::Running,
-    State::Stopping,
-    State::QuickStop,
-    State::FaultReaction,
-    State::Fault,
-    State::Unknown,
-];
-
 /// Its labels are the ids of its line and its own.
 pub(super) fn collect(labels: [&str; 2], plan: Option<LinePlan>, drive: &DriveHandle, samples: &mut Samples) {
     let (snapshot, now) = (drive.snapshot(), Instant::now());
@@ -97,7 +84,8 @@ fn tell_watchdog(snapshot: &Snapshot, plan: Option<LinePlan>, labels: [&str; 2],
 
 fn tell_status(status: &Status, snapshot: &Snapshot, labels: [&str; 2], samples: &mut Samples) {
     let [line, name] = labels;
-    for state in STATES {
+    // Those that it is not in are told too.
+    for state in State::ALL {
         let is_in = flag(state == status.state);
         samples.add(Id::DriveState, &[line, name, &state.to_string().replace(' ', "_")], is_in);
     }

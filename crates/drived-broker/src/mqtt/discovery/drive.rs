@@ -24,19 +24,6 @@ const COMMANDS_EXPIRE_S: u32 = 2;
 /// The highest setpoint that is offered where no limit is configured: the mains' own.
 const USUAL_HIGH_HZ: f64 = 50.0;
 
-/// Every state that a drive can show.
-const STATES: [State; 9] = [
-    State::NotReady,
-    State::Disabled,
-    State::Ready,
-    State::Running,
-    State::Stopping,
-    State::QuickStop,
-    State::FaultReaction,
-    State::Fault,
-    State::Unknown,
-];
-
 /// Everything that a command can become. That this is not known has a word of its own: `unknown` is Home Assistant's for no value.
 const OUTCOMES: [&str; 8] =
     [ACCEPTED, "confirmed", "not_confirmed", OUTCOME_UNKNOWN, "refused", "expired", "superseded", "nothing"];
@@ -75,7 +62,7 @@ fn shown(face: &Face, topic: impl Fn(&str) -> String) -> [Component; 6] {
             "state",
             "sensor",
             json!({
-                "name": "State", "device_class": "enum", "options": STATES, "state_topic": topic("state"),
+                "name": "State", "device_class": "enum", "options": State::ALL, "state_topic": topic("state"),
                 "value_template": good("status.", "state"), "expire_after": expire_after,
             }),
         ),
