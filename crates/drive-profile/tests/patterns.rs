@@ -286,3 +286,15 @@ async fn a_start_at_another_setpoint_than_stands_in_its_register_is_not_confirme
         "{error}"
     );
 }
+
+/// Modbus Application Protocol V1.1b3, section 7: 05 is "accepted, and takes long", whatever was written.
+#[test]
+fn a_coil_that_is_accepted_and_takes_long_is_of_unknown_outcome_as_a_register_is() {
+    let slave = drive_core::SlaveAddress::try_from(1).expect("it is one");
+    for function in [0x05, 0x06, 0x0F, 0x10, 0x17] {
+        let exchange = drive_core::Exchange { function, register: Some(1) };
+        let meaning = drive_core::ExceptionMeaning::standard(5);
+        let error = Error::Exception { slave, exchange, code: 5, meaning };
+        assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{function:02X}h");
+    }
+}
