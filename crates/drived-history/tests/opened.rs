@@ -69,7 +69,9 @@ fn the_questions_of_the_readme_are_answered_by_the_shell_of_sqlite() {
     let path = folder.file("history.sqlite");
     // It is open, as it is beside a daemon.
     let _store = written(&path);
-    let Some(told) = said("sqlite3", &["-readonly", path.to_str().unwrap(), shown("sql")], &folder.file(""))
+    // What begins with a comment would be taken for an option.
+    let question = format!("\n{}", shown("sql"));
+    let Some(told) = said("sqlite3", &["-readonly", path.to_str().unwrap(), &question], &folder.file(""))
     else {
         return;
     };
