@@ -20,6 +20,7 @@ use drive_core::{
 };
 use support::{MS, script::Script};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::time::Instant;
 use tokio_modbus::{ExceptionCode, Request, Response, client::Client};
 
 /// "Writing the value 10 to the word W252 of slave 2", question and answer (VVDED397054 p. 23/47).
@@ -258,6 +259,47 @@ async fn a_line_speaks_ascii_and_leaves_a_late_slave_alone() {
     theirs.write_all(&frames[..len]).await.unwrap();
     assert_eq!(call.await.unwrap().unwrap(), Ok(WRITTEN));
     assert_eq!(line.stats().slaves[&2].late, 1);
+}
+
+/// A write on a line that takes its time for characters, and when the last of it is off the line.
+fn ask_in_time(script: &mut Script<Ascii>) -> (Bytes, Instant) {
+    let request = script.ask(2, &WRITE);
+    let end = script.now + settings().characters(request.len());
+    script.machine.handle_sent(end, end + 500 * MS);
+    (request, end)
+}
+
+/// The answer is there as soon as the line can carry it.
+fn answered(script: &mut Script<Ascii>, end: Instant) -> Step {
+    script.now = end + settings().characters(PRINTED.len()) + 5 * MS;
+    script.machine.handle_bytes(script.now, PRINTED)
+}
+
+/// W:493662, W:364162 and W:201462 of `drive-fire`: what was damaged was the echo, and whoever asks again behind it speaks into the answer.
+#[test]
+fn an_echo_that_is_damaged_is_not_the_answer_where_the_line_carries_none_so_soon() {
+    let mut script = script(Echo::Off);
+    script.machine.set_far_end_paces(true);
+    let (request, end) = ask_in_time(&mut script);
+    let mut echo = request.to_vec();
+    echo[9] ^= 0x01;
+    assert_eq!(script.machine.handle_bytes(end, &echo), Step::More);
+    assert_eq!(answered(&mut script, end), Step::Done(Ok(Ok(WRITTEN))));
+}
+
+#[test]
+fn a_whole_echo_is_told_by_its_time_and_makes_no_confirmation_then_or_later() {
+    let mut script = script(Echo::Auto);
+    script.machine.set_far_end_paces(true);
+    let (request, end) = ask_in_time(&mut script);
+    assert_eq!(script.machine.handle_bytes(end, &request), Step::More);
+    assert!(script.machine.echoes(), "no answer comes so soon");
+    assert_eq!(answered(&mut script, end), Step::Done(Ok(Ok(WRITTEN))));
+    assert!(script.machine.echoes());
+    // The slave is dead, and the adapter holds the echo back for as long as an answer takes.
+    let (_, end) = ask_in_time(&mut script);
+    assert_eq!(answered(&mut script, end), Step::More);
+    assert_eq!(script.wait_for_step(), Step::Done(Err(Failure::Timeout)));
 }
 
 #[tokio::test(start_paused = true)]

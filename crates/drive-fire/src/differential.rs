@@ -1,5 +1,5 @@
-//! Who accepts what: answers, as manuals print them and changed, to our line and to pymodbus, which was written by somebody else. What
-//! ours takes for an answer the other takes for the same frame; what is not changed both take.
+//! Who accepts what: answers, as manuals print them and changed, to our line and to pymodbus and libmodbus, which were written by somebody
+//! else. What ours takes for an answer the other takes for the same frame; what is not changed both take.
 //!
 //! Ours takes more in two ways, on purpose: a frame that stands behind stray bytes, and in ASCII one that ends with another character
 //! than LF, which function 08/03 changes. Then the frame has to stand in what came, and the other has to take it where it stands alone.
@@ -33,6 +33,38 @@ use crate::{
 
 const SLAVE: u8 = 1;
 
+/// Who else is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Peer {
+    /// pymodbus' framers, RTU and ASCII: they know no request.
+    Pymodbus,
+    /// libmodbus as a master, RTU: it holds an answer against its request.
+    Libmodbus,
+}
+
+impl Peer {
+    const fn script(self) -> &'static str {
+        match self {
+            Self::Pymodbus => "pymodbus_frames.py",
+            Self::Libmodbus => "libmodbus_frames.py",
+        }
+    }
+
+    fn replay(self, seed: u64, count: u64) -> String {
+        format!(
+            "drive-fire differential --seed {seed} --answers {count} --peer {}",
+            if self == Self::Pymodbus { "pymodbus" } else { "libmodbus" }
+        )
+    }
+
+    const fn part(self) -> &'static str {
+        match self {
+            Self::Pymodbus => "differential, with pymodbus",
+            Self::Libmodbus => "differential, with libmodbus",
+        }
+    }
+}
+
 /// One answer to one question.
 #[derive(Debug, Clone)]
 struct Case {
@@ -43,12 +75,12 @@ struct Case {
     whole: bool,
 }
 
-fn cases(seed: u64, count: u64) -> Vec<Case> {
+fn cases(seed: u64, count: u64, peer: Peer) -> Vec<Case> {
     let mut rng = Rng::with_seed(seed);
-    (0..count).map(|_| a_case(&mut rng)).collect()
+    (0..count).map(|_| a_case(&mut rng, peer)).collect()
 }
 
-fn a_case(rng: &mut Rng) -> Case {
+fn a_case(rng: &mut Rng, peer: Peer) -> Case {
     let answered: [(Request<'static>, &[u8]); 6] = [
         (Request::ReadHoldingRegisters(0x6B, 3), &[3, 6, 2, 0x2B, 0, 0, 0, 0x64]),
         (Request::ReadHoldingRegisters(3201, 1), &[3, 2, 2, 0x40]),
@@ -59,7 +91,7 @@ fn a_case(rng: &mut Rng) -> Case {
     ];
     let (request, answer) =
         answered.into_iter().nth(rng.usize(..6)).unwrap_or((Request::ReportServerId, &[]));
-    let is_ascii = rng.bool();
+    let is_ascii = peer == Peer::Pymodbus && rng.bool();
     let mut bytes =
         if is_ascii { ascii::frame(SLAVE, answer, b'\n') } else { rtu::frame(SLAVE, answer) }.to_vec();
     let whole = rng.u8(..8) == 0;
@@ -99,12 +131,15 @@ fn ours(case: &Case) -> Option<Vec<u8>> {
 type Taken = (u8, Vec<u8>);
 
 /// What the other takes, case by case.
-fn theirs(python: &Path, cases: &[Case]) -> io::Result<Vec<Option<Taken>>> {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("peers/pymodbus_frames.py");
+fn theirs(python: &Path, peer: Peer, cases: &[Case]) -> io::Result<Vec<Option<Taken>>> {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("peers").join(peer.script());
     let mut child = Command::new(python).arg(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
     let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
-    let line =
-        |case: &Case| format!("{} {}\n", if case.is_ascii { "ascii" } else { "rtu" }, hex(&case.bytes));
+    let line = |case: &Case| {
+        let request = pdu::encode(&case.request).map(|pdu| hex(&pdu)).unwrap_or_default();
+        let bytes = if case.bytes.is_empty() { "-".to_owned() } else { hex(&case.bytes) };
+        format!("{} {bytes} {request}\n", if case.is_ascii { "ascii" } else { "rtu" })
+    };
     let text: String = cases.iter().map(line).collect();
     let mut stdin = child.stdin.take().ok_or(io::ErrorKind::BrokenPipe)?;
     // It answers while it is asked: both ways hold less than a long list.
@@ -184,15 +219,15 @@ fn against(case: &Case, taken: Option<&[u8]>, other: Option<&Taken>) -> Option<S
     }
 }
 
-/// So many answers, judged by the pymodbus of this Python.
+/// So many answers, judged by this peer, which this Python asks.
 ///
 /// # Errors
 /// The other cannot be run.
-pub fn run(python: &Path, seed: u64, count: u64) -> io::Result<Told> {
+pub fn run(python: &Path, peer: Peer, seed: u64, count: u64) -> io::Result<Told> {
     let begun = Clock::now();
-    let mut told = Told::new("differential, with pymodbus", "answers");
-    let cases = cases(seed, count);
-    let others = theirs(python, &cases)?;
+    let mut told = Told::new(peer.part(), "answers");
+    let cases = cases(seed, count, peer);
+    let others = theirs(python, peer, &cases)?;
     if others.len() != cases.len() {
         return Err(io::Error::other(format!("{} answers to {} questions", others.len(), cases.len())));
     }
@@ -201,25 +236,20 @@ pub fn run(python: &Path, seed: u64, count: u64) -> io::Result<Told> {
     // What ours has taken, alone before the other.
     let taken_alone: Vec<Case> =
         cases.iter().zip(&taken).filter_map(|(case, taken)| Some(alone(case, taken.as_ref()?))).collect();
-    let others_alone = theirs(python, &taken_alone)?;
+    let others_alone = theirs(python, peer, &taken_alone)?;
     for (case, other) in taken_alone.iter().zip(&others_alone) {
         if ours(case) != other.as_ref().map(|(_, pdu)| pdu.clone()) {
             let what = format!("alone {:02X?} is {other:02X?} to the other", case.bytes);
-            told.finds.push(Find { what, replay: format!("drive-fire differential --seed {seed}") });
+            told.finds.push(Find { what, replay: peer.replay(seed, count) });
         }
     }
     let both = taken.iter().zip(&others).filter(|(ours, other)| ours.is_some() && other.is_some()).count();
     let alone = taken.iter().zip(&others).filter(|(ours, other)| ours.is_none() && other.is_some()).count();
-    told.details.push(format!(
-        "{both} taken by both, {alone} by the other alone: it knows no request that an answer has to fit"
-    ));
+    told.details.push(format!("{both} taken by both, {alone} by the other alone"));
     let all = || cases.iter().zip(&taken).zip(&others);
     for (number, ((case, taken), other)) in all().enumerate() {
         if let Some(what) = against(case, taken.as_deref(), other.as_ref()) {
-            told.finds.push(Find {
-                what: format!("{number}: {what}"),
-                replay: format!("drive-fire differential --seed {seed}"),
-            });
+            told.finds.push(Find { what: format!("{number}: {what}"), replay: peer.replay(seed, count) });
         }
     }
     told.finds.truncate(20);

@@ -9,4 +9,7 @@ pub mod differential;
 pub mod fuzz;
 pub mod matrix;
 pub mod model;
+pub mod mutation;
 pub mod report;
+pub mod sbom;
+pub mod soak;

@@ -3,7 +3,10 @@
 #![forbid(unsafe_code)]
 
 use std::{
-    process::ExitCode,
+    io,
+    path::{Path, PathBuf},
+    process::{self, ExitCode},
+    thread,
     time::{Duration, Instant},
 };
 
@@ -11,9 +14,11 @@ use clap::{Parser, Subcommand};
 use drive_fire::{
     differential, fuzz,
     matrix::{self, story},
-    model,
-    report::Told,
+    model, mutation,
+    report::{self, Told},
+    sbom, soak,
 };
+use drive_testing::peers;
 
 /// Attacks everything that stands, and says what was tried and what was found.
 #[derive(Debug, Parser)]
@@ -41,9 +46,9 @@ enum Part {
         /// How many cells there are, and which cannot exist.
         #[arg(long)]
         census: bool,
-        /// Against its planted defects; those in the line need `--features plants`.
-        #[arg(long)]
-        plants: bool,
+        /// Against its planted defects, or one of them by its name; those in the line need `--features plants`.
+        #[arg(long, num_args = 0..=1, default_missing_value = "")]
+        plants: Option<String>,
     },
     /// Whatever takes bytes or text from outside.
     Fuzz {
@@ -60,12 +65,15 @@ enum Part {
         #[arg(long)]
         plants: bool,
     },
-    /// Who accepts what: ours and pymodbus.
+    /// Who accepts what: ours and somebody else.
     Differential {
+        /// Who else.
+        #[arg(long, value_enum, default_value = "pymodbus")]
+        peer: differential::Peer,
         /// So many answers.
         #[arg(long, default_value_t = 100_000)]
         answers: u64,
-        /// A Python that has pymodbus.
+        /// A Python that has pymodbus; for libmodbus any.
         #[arg(long, default_value = "python3")]
         python: std::path::PathBuf,
     },
@@ -77,6 +85,38 @@ enum Part {
         /// One story alone, as a find names it.
         #[arg(long)]
         story: Option<String>,
+    },
+    /// Mutants that a variable chooses, against the tests that own the promises they break.
+    Mutants {
+        /// Looks for a test by which each dies, and prints the list as it is to be: of one crate or one mutant, or of all.
+        #[arg(long, num_args = 0..=1, default_missing_value = "")]
+        hunt: Option<String>,
+    },
+    /// Days of a plant in virtual time.
+    Soak {
+        /// So many hours.
+        #[arg(long, default_value_t = 24)]
+        hours: u64,
+        /// So many lines.
+        #[arg(long, default_value_t = 8)]
+        lines: usize,
+        /// So many drives on each.
+        #[arg(long, default_value_t = 31)]
+        drives: u8,
+    },
+    /// The lease, explored to the end, with its planted defects.
+    Lease {
+        /// Every sequence of so many steps.
+        #[arg(long, default_value_t = 5)]
+        depth: usize,
+    },
+    /// The tests that could not run for want of something, when they were run last.
+    Skipped,
+    /// What a program is built of, as CycloneDX 1.5.
+    Sbom {
+        /// Its package.
+        #[arg(long, default_value = "drived")]
+        package: String,
     },
     /// The master of a line, explored to the end.
     Model {
@@ -96,10 +136,35 @@ enum Part {
     },
 }
 
+/// The repository.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// A cell that goes round in virtual time is named, and ends the program.
+fn end_what_is_stuck() {
+    thread::spawn(|| {
+        loop {
+            thread::sleep(Duration::from_secs(5));
+            if let Some(what) = report::stuck(Duration::from_secs(300)) {
+                eprintln!("FOUND it does not end: {what}");
+                process::exit(2);
+            }
+        }
+    });
+}
+
+fn ended(result: io::Result<()>) -> ExitCode {
+    let Err(error) = result else { return ExitCode::SUCCESS };
+    eprintln!("{error}");
+    ExitCode::FAILURE
+}
+
 fn main() -> ExitCode {
     let Arguments { part, seed, minutes } = Arguments::parse();
     let end = minutes.map(|minutes| Instant::now() + Duration::from_secs(60 * minutes));
     let go_on = move || end.is_none_or(|end| Instant::now() < end);
+    end_what_is_stuck();
     let told: Vec<Told> = match part {
         Part::Matrix { cell: Some(name), .. } => {
             let Some(cell) = matrix::Cell::named(&name) else {
@@ -117,7 +182,10 @@ fn main() -> ExitCode {
             matrix::census(3_000_000).iter().for_each(|line| println!("{line}"));
             return ExitCode::SUCCESS;
         }
-        Part::Matrix { plants: true, of_each, .. } => vec![matrix::find_plants(seed, of_each as usize)],
+        Part::Matrix { plants: Some(only), of_each, .. } => {
+            let only = Some(&*only).filter(|only| !only.is_empty());
+            vec![matrix::find_plants(seed, of_each as usize, only)]
+        }
         Part::Matrix { of_each, .. } => vec![matrix::run(seed, of_each, go_on)],
         Part::Fuzz { target: Some(name), execution: Some(number), .. } => {
             let known = fuzz::Target::ALL.into_iter().find(|known| format!("{known:?}") == name);
@@ -130,7 +198,8 @@ fn main() -> ExitCode {
         }
         Part::Fuzz { plants: true, .. } => vec![fuzz::find_plants(seed, 20_000)],
         Part::Fuzz { seconds, .. } => vec![fuzz::run(seed, Duration::from_secs(seconds), go_on)],
-        Part::Differential { answers, python } => match differential::run(&python, seed, answers) {
+        Part::Differential { peer, answers, python } => match differential::run(&python, peer, seed, answers)
+        {
             Ok(told) => vec![told],
             Err(error) => {
                 eprintln!("{}: {error}", python.display());
@@ -147,6 +216,30 @@ fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         Part::Worlds { stories, .. } => vec![story::run(seed, stories, go_on)],
+        Part::Mutants { hunt: Some(only) } => {
+            return ended(mutation::hunt(&root(), Some(&*only).filter(|only| !only.is_empty())));
+        }
+        Part::Mutants { hunt: None } => match mutation::run(&root(), go_on) {
+            Ok(told) => vec![told],
+            Err(error) => return ended(Err(error)),
+        },
+        Part::Soak { hours, lines, drives } => {
+            vec![soak::run(
+                seed,
+                soak::Size { lines, drives, time: Duration::from_secs(3_600 * hours) },
+                go_on,
+            )]
+        }
+        Part::Lease { depth } => vec![model::lease::run(depth)],
+        Part::Skipped => {
+            let skipped = peers::skipped();
+            skipped.iter().for_each(|line| println!("{line}"));
+            println!("{} tests could not run", skipped.len());
+            return ExitCode::SUCCESS;
+        }
+        Part::Sbom { package } => {
+            return ended(sbom::bill(&root(), &package).map(|bill| println!("{bill:#}")));
+        }
         Part::Model { steps: Some(code), setting, .. } => {
             let known = model::master::Setting::ALL.into_iter().find(|known| format!("{known:?}") == setting);
             let (Some(steps), Some(setting)) = (model::steps(&code), known) else {

@@ -1,6 +1,25 @@
 //! What a part tells: how much it tried, what it found, which of its planted defects it found, and how long it took.
 
-use std::{fmt, time::Duration};
+use std::{
+    fmt,
+    sync::{Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+
+/// What is under way, and since when.
+static UNDER_WAY: Mutex<Option<(String, Instant)>> = Mutex::new(None);
+
+/// This begins.
+pub fn begins(what: &impl fmt::Display) {
+    *UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner) = Some((what.to_string(), Instant::now()));
+}
+
+/// What is under way for longer than this in real time: it goes round where virtual time stands still, and nothing else ends it.
+#[must_use]
+pub fn stuck(longest: Duration) -> Option<String> {
+    let under_way = UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner);
+    under_way.as_ref().filter(|(_, since)| since.elapsed() > longest).map(|(what, _)| what.clone())
+}
 
 /// What was found, and how it is found again.
 #[derive(Debug, Clone, PartialEq, Eq)]

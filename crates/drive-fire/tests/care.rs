@@ -72,3 +72,37 @@ fn every_licence_is_on_the_list() {
     assert!(packages.len() > 100, "{}", packages.len());
     assert_eq!(wrong, Vec::<String>::new());
 }
+
+/// How many points of levels 1 and 2 each section of OWASP ASVS 5.0.0 has.
+const ASVS: &str = "1.1:2 1.2:9 1.3:11 1.4:3 1.5:2 2.1:3 2.2:3 2.3:4 2.4:1 3.2:2 3.3:4 3.4:6 3.5:5 3.7:2 4.1:3 4.2:1 4.3:2 4.4:4 5.1:1 \
+    5.2:3 5.3:2 5.4:3 6.1:3 6.2:12 6.3:4 6.4:4 6.5:5 6.6:3 6.8:4 7.1:3 7.2:4 7.3:2 7.4:5 7.5:2 7.6:2 8.1:2 8.2:3 8.3:1 8.4:1 9.1:3 9.2:4 \
+    10.1:2 10.2:2 10.3:4 10.4:11 10.5:5 10.6:2 10.7:3 11.1:2 11.2:3 11.3:3 11.4:4 11.5:1 11.6:1 12.1:3 12.2:2 12.3:4 13.1:1 13.2:5 13.3:2 \
+    13.4:5 14.1:2 14.2:4 14.3:3 15.1:3 15.2:3 15.3:7 16.1:1 16.2:5 16.3:4 16.4:3 16.5:3 17.1:1 17.2:4 17.3:2";
+
+#[test]
+fn each_point_of_the_catalogue_stands_in_one_row_and_says_whether_it_holds() {
+    let whole: BTreeSet<String> = ASVS
+        .split_whitespace()
+        .filter_map(|section| section.split_once(':'))
+        .flat_map(|(section, count)| {
+            let count: u32 = count.parse().expect("it is a number");
+            (1..=count).map(move |point| format!("V{section}.{point}"))
+        })
+        .collect();
+    assert_eq!(whole.len(), 253, "as the catalogue has them");
+    let text = read(".github/SECURITY-POINTS.md");
+    let mut said = BTreeSet::new();
+    for row in text.lines().filter_map(|line| line.strip_prefix("| V")) {
+        let [points, state, why] = row.trim_end_matches(" |").split(" | ").collect::<Vec<_>>()[..] else {
+            panic!("{row:?} has not three cells")
+        };
+        assert!(["holds", "does not apply", "lacks"].contains(&state) && why.len() > 5, "{row}");
+        let (section, range) = points.rsplit_once('.').expect("it is a point");
+        let (first, last) = range.split_once('–').unwrap_or((range, range));
+        let number = |text: &str| text.parse::<u32>().unwrap_or_else(|_| panic!("{row}"));
+        for point in number(first)..=number(last) {
+            assert!(said.insert(format!("V{section}.{point}")), "V{section}.{point} stands there twice");
+        }
+    }
+    assert_eq!(said, whole);
+}

@@ -39,6 +39,34 @@ fn a_motor_that_trips_in_a_stop_may_coast() {
     }
 }
 
+/// Each of these cells was a find once.
+#[test]
+fn no_cell_that_was_a_find_is_one_again() {
+    for (name, what) in [
+        ("W:493662", "the silence of ASCII behind an echo: asked again into the answer"),
+        ("W:364162", "the same"),
+        ("W:201462", "the same behind a damaged echo"),
+        ("W:346590", "a 21 whose status word was refused: told that it may coast while it injects"),
+        // Explained: between two looks half a second apart a supply went and came back. The words are those of a ramp that has ended.
+        ("E:41031", "at rest at 17 Hz, in a stop"),
+        ("E:41500", "the same"),
+        ("E:36801", "the same"),
+        ("W:188834", "a run command that trips before the next look, told at rest"),
+        ("W:190931", "a run word that was carried out and answered by exception 04, without a lease"),
+        ("W:161341", "the same"),
+        ("F:1614781", "the same by 0Bh"),
+        ("A:85936002", "the same of a 58"),
+        (
+            "W:177444",
+            "a start that was confirmed, and says that this was four seconds ago: the matrix was wrong",
+        ),
+    ] {
+        let cell = Cell::named(name).expect("it is a cell");
+        let why = against(&cell);
+        assert!(why.is_empty(), "{what}: {cell}\n{}", why.join("\n"));
+    }
+}
+
 /// A late answer was heard, and its slave asked again at once: by the next request, and by the probe of one that was off-line.
 #[test]
 fn a_slave_that_was_heard_late_has_its_pause_before_it_is_asked_or_probed() {

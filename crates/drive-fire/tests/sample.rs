@@ -42,10 +42,53 @@ fn fuzzing_finds_what_is_planted() {
     assert_eq!(told.plants_found(), told.plants.len(), "{told}");
 }
 
+/// Each by the cell that has found it once: a number is a cell, and names it for as long as no axis of the matrix changes.
+const FOUND: &[(&str, &str)] = &[
+    ("family: StartConfirmedByAnything", "F:1848888"),
+    ("family: ResetConfirmedByAnything", "F:3591731"),
+    ("family: AlwaysInForce", "E:24482"),
+    ("family: ForgetEndsTheLease", "E:19106"),
+    ("family: StopSentEndsTheLease", "E:35943"),
+    ("family: NoOutputIsStandstill", "F:1525394"),
+];
+
+#[test]
+fn the_matrix_finds_again_what_is_planted_in_families() {
+    let told = matrix::find_again(FOUND);
+    println!("{told}");
+    assert_eq!((told.plants_found(), &told.finds), (FOUND.len(), &Vec::new()), "{told}");
+}
+
+#[test]
+fn no_small_case_of_the_lease_breaks_an_invariant_and_each_plant_breaks_one() {
+    let told = model::lease::run(5);
+    finds_nothing(&told, 402_233);
+    assert_eq!(told.plants_found(), told.plants.len(), "{told}");
+}
+
 /// With `--features plants`: most of the wrong lines are found; which live is printed.
 #[cfg(feature = "plants")]
 mod planted {
-    use super::model;
+    use super::{matrix, model};
+
+    /// As [`FOUND`](super::FOUND).
+    const FOUND: &[(&str, &str)] = &[
+        ("line: crc-unchecked", "A:35571058"),
+        ("line: transaction-unchecked", "W:201890"),
+        ("line: late-answer-unfeared", "A:91421238"),
+        ("line: silence-unkept", "E:76152"),
+        ("line: pause-unkept", "E:18204"),
+        ("line: command-sent-late", "E:26300"),
+        ("line: sent-told-as-unsent", "W:174749"),
+        ("line: lost-write-told-as-expired", "W:174749"),
+    ];
+
+    #[test]
+    fn the_matrix_finds_again_what_is_planted_in_the_line() {
+        let told = matrix::find_again(FOUND);
+        println!("{told}");
+        assert_eq!((told.plants_found(), &told.finds), (FOUND.len(), &Vec::new()), "{told}");
+    }
 
     #[test]
     fn the_model_finds_what_is_planted() {

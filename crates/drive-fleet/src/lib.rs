@@ -77,6 +77,10 @@ mod troubles;
 pub mod view;
 mod watchdog;
 
+/// See `drive_bus::mutants`.
+#[doc(hidden)]
+pub use drive_bus::mutant;
+
 pub use builder::{FleetBuilder, FleetError, SettingProblem, check_settings};
 pub use cause::{Act, Cause, ChangedWord, Policy};
 pub use concern::{Concern, ConcernKind, Severity};

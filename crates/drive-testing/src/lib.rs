@@ -8,6 +8,7 @@
 //! - [`truth`]: what a status says, against the machine; [`witness`]: what others tell of it, against the machine.
 //! - [`referee`]: who may move a motor and what stops it, by the manuals alone.
 //! - [`worlds`]: everything around a drive that may decide over its motor, and who judges what is said of it then.
+//! - [`peers`]: what was not written here, and tests that cannot run without it.
 //! - [`Contract`]: what every family promises of itself, for a family from anywhere to run on itself.
 //!
 //! This crate is for tests: its functions panic when what they check is not so.
@@ -19,6 +20,7 @@ pub mod bench;
 pub mod contract;
 pub mod frames;
 pub mod mutants;
+pub mod peers;
 pub mod recorder;
 pub mod referee;
 pub mod rig;

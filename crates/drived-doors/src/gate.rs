@@ -267,7 +267,7 @@ impl Gate {
         B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
     {
         let (mut parts, body) = request.into_parts();
-        if !door.hosts.allow(&parts.headers) {
+        if drive_fleet::mutant!("any-host", !door.hosts.allow(&parts.headers), false) {
             let why =
                 "this server has no such name: allowed_hosts in the configuration names those that it has";
             return Err(Refusal::new(StatusCode::MISDIRECTED_REQUEST, why));
@@ -281,7 +281,10 @@ impl Gate {
             return Err(Refusal::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, why));
         }
         let path = parts.uri.path().to_owned();
-        let stops = parts.method == Method::POST && self.stops.iter().any(|stop| fits(stop, &path));
+        let stops = self.stops.iter().any(|stop| fits(stop, &path));
+        let stops =
+            drive_fleet::mutant!("selected-stop-is-no-stop", stops, stops && !path.contains("/selected/"));
+        let stops = stops && parts.method == Method::POST;
         if asking.is_for_stops() && !stops {
             let why = "all places are taken: this one is for stops";
             return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, why).after(Duration::from_secs(1)));
@@ -326,7 +329,9 @@ impl Gate {
             return Ok(self.log_out(door, &caller, &parts.headers));
         }
         let Rights { stop, operate, engineer, .. } = caller.rights;
-        if !(operate || engineer || stops && stop) {
+        let may = operate || engineer || stops && stop;
+        let may = drive_fleet::mutant!("viewer-commands", may, true);
+        if !drive_fleet::mutant!("stop-wants-operate", may, operate || engineer) {
             self.note_refused(&caller, &parts);
             return Err(Refusal::lacks_right(&caller, if stops { "stop" } else { "operate" }));
         }
@@ -337,7 +342,7 @@ impl Gate {
         };
         let came = Record { body: bounded(&body), ..record(Kind::Command) };
         let written = self.audit.record(came);
-        if stops {
+        if drive_fleet::mutant!("stop-waits-for-the-disk", stops, false) {
             // No disk holds up a stop.
             written.whenever();
         } else if let Err(error) = written.done().await {
@@ -385,7 +390,9 @@ impl Gate {
         what: (&Method, Option<&str>),
         body: &[u8],
     ) -> Result<Response, Refusal> {
-        if peer.address().is_some() || !caller.rights.engineer {
+        if drive_fleet::mutant!("tokens-over-the-network", peer.address().is_some(), false)
+            || !caller.rights.engineer
+        {
             return Err(Refusal::new(
                 StatusCode::FORBIDDEN,
                 "tokens are made and removed over the control socket",
@@ -403,7 +410,7 @@ impl Gate {
     pub(super) fn holds(&self, authority: &Authority) -> bool {
         let of_hash = |hash: &str, role: Role| {
             let token = self.tokens.as_ref().and_then(|tokens| tokens.of_hash(hash).ok().flatten());
-            token.is_some_and(|token| token.role == role)
+            drive_fleet::mutant!("removed-token-holds", token.is_some_and(|token| token.role == role), true)
         };
         match authority {
             Authority::Freely => true,
@@ -454,7 +461,7 @@ impl Gate {
             }));
         };
         // Whoever has a right token stops his motors, whatever others do at the same address.
-        if !stops {
+        if drive_fleet::mutant!("guessing-keeps-a-stop-out", !stops, true) {
             self.wait(peer).map_err(Unlet::Refused)?;
         }
         let secret = authorization.to_str().ok().and_then(|text| text.split_once(' '));
@@ -468,7 +475,11 @@ impl Gate {
                 let authority = Authority::Token { sha256, role: token.role };
                 Ok(Some((token, authority)))
             }
-            None => Err(Unlet::Refused(self.failed(peer, without))),
+            None => drive_fleet::mutant!(
+                "wrong-token-is-none",
+                Err(Unlet::Refused(self.failed(peer, without))),
+                Ok(None)
+            ),
         }
     }
 

@@ -31,6 +31,7 @@ use self::{
 use super::{
     Failure, Frame, Machine, Step, Stray,
     echo::{Echo, EchoState, MAYBE_ECHO},
+    pace::Pace,
 };
 use crate::answer;
 
@@ -69,6 +70,7 @@ pub struct Ascii {
     echo: EchoState,
     configured: Echo,
     delimiters: Delimiters,
+    pace: Pace,
     current: Option<Current>,
     /// What opened the last exchange: slave and PDU.
     sent: (u8, Bytes),
@@ -98,12 +100,16 @@ impl Ascii {
     /// A machine for a line with these settings.
     #[must_use]
     pub fn new(serial: SerialSettings, settings: AsciiSettings, echo: Echo) -> Self {
+        // Time proves nothing until whoever has the port says so.
+        let mut pace = Pace::new(serial);
+        pace.set_far_end_paces(false);
         Self {
             character_gap: settings.character_gap,
             longest: overtime(serial, settings),
             echo: echo.into(),
             configured: echo,
             delimiters: Delimiters::new(settings.delimiter),
+            pace,
             current: None,
             sent: (0, Bytes::new()),
             receiver: Receiver::default(),
@@ -114,7 +120,8 @@ impl Ascii {
     }
 
     /// A frame whose LRC fits.
-    fn heard(&mut self, slave: u8, pdu: Bytes) -> Step {
+    fn heard(&mut self, now: Instant, slave: u8, pdu: Bytes) -> Step {
+        let is_early = self.pace.is_early(now, len(pdu.len()));
         let stray = Stray::frame(slave, &pdu);
         let equals = slave == self.sent.0 && pdu == self.sent.1;
         let Some(current) = self.current.as_mut().filter(|current| current.slave == slave) else {
@@ -132,12 +139,25 @@ impl Ascii {
                 self.strays.push(Stray::Echo);
                 return Step::More;
             }
+            // No answer comes so soon. One that is known to be silent may echo all the same.
+            if is_early {
+                current.echo_taken = true;
+                if self.echo == EchoState::Unknown {
+                    self.echo = EchoState::Present;
+                }
+                self.strays.push(Stray::Echo);
+                return Step::More;
+            }
             if self.echo == EchoState::Unknown {
                 current.misfit = Some("an echo could not be told from it".to_owned());
                 return Step::More;
             }
         }
         let frame = Frame::of(&pdu);
+        if is_early {
+            self.strays.push(Stray::Early { slave, frame });
+            return Step::More;
+        }
         match answer::check(&current.request, pdu) {
             Ok(answer) => {
                 self.taken = Some(frame);
@@ -157,15 +177,17 @@ impl Ascii {
     }
 
     /// Something that began as a frame and is none. Where it begins as the answer does, it is the answer, damaged;
-    /// anything else may be somebody else's, with the answer still to come.
-    fn garbled(&mut self, head: Option<(u8, u8)>, len: usize, why: &'static str) -> Step {
+    /// anything else may be somebody else's, with the answer still to come. What comes sooner than the line can carry an answer is an
+    /// echo at the most: who asks again behind that speaks into the answer.
+    fn garbled(&mut self, now: Instant, head: Option<(u8, u8)>, len: usize, why: &'static str) -> Step {
+        let is_early = self.pace.is_early(now, len);
         self.strays.push(Stray::Noise(len));
         let Some(current) = &mut self.current else { return Step::More };
         current.disturbed = true;
         let resembles = head.is_some_and(|(slave, function)| {
             slave == current.slave && function & 0x7F == current.request.function_code().value()
         });
-        if !resembles {
+        if !resembles || crate::mutant!("damaged-echo-is-the-answer", is_early, false) {
             return Step::More;
         }
         if self.echo != EchoState::Absent && !current.echo_taken {
@@ -188,10 +210,10 @@ impl Ascii {
         }
     }
 
-    fn act(&mut self, heard: Heard) -> Step {
+    fn act(&mut self, now: Instant, heard: Heard) -> Step {
         match heard {
-            Heard::Frame { slave, pdu } => self.heard(slave, pdu),
-            Heard::Garbled { head, len, why } => self.garbled(head, len, why),
+            Heard::Frame { slave, pdu } => self.heard(now, slave, pdu),
+            Heard::Garbled { head, len, why } => self.garbled(now, head, len, why),
         }
     }
 
@@ -223,6 +245,7 @@ impl Machine for Ascii {
         if let Some(Heard::Garbled { len, .. }) = self.receiver.give_up() {
             self.strays.push(Stray::Noise(len));
         }
+        self.pace.forget();
         self.sent = (slave, pdu.clone());
         self.current = Some(Current {
             slave,
@@ -236,7 +259,12 @@ impl Machine for Ascii {
         frame(slave, pdu, self.delimiters.of(slave))
     }
 
-    fn handle_sent(&mut self, _: Instant, answer_by: Instant) {
+    fn set_far_end_paces(&mut self, paces: bool) {
+        self.pace.set_far_end_paces(paces);
+    }
+
+    fn handle_sent(&mut self, end: Instant, answer_by: Instant) {
+        self.pace.sent(end, len(self.sent.1.len()));
         if let Some(current) = &mut self.current {
             current.answer_by = Some(answer_by);
         }
@@ -249,7 +277,7 @@ impl Machine for Ascii {
             if let Some(heard) = self.receiver.hear(character) {
                 self.count_noise();
                 // After the answer nothing more is expected: what follows it is stray.
-                let next = self.act(heard);
+                let next = self.act(now, heard);
                 step = if step == Step::More { next } else { step };
             }
         }
@@ -269,7 +297,7 @@ impl Machine for Ascii {
             return Step::More;
         }
         if let Some(broken_off) = self.receiver.give_up() {
-            let step = self.act(broken_off);
+            let step = self.act(now, broken_off);
             if step != Step::More {
                 return step;
             }

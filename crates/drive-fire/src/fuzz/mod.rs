@@ -4,6 +4,7 @@
 mod broken;
 mod bytes;
 mod machines;
+mod messages;
 mod readers;
 
 use std::{
@@ -40,11 +41,17 @@ pub enum Target {
     Control,
     /// Addresses, settings, lines and setpoints as people write them.
     Words,
+    /// Commands in JSON, beside serde_json.
+    Json,
+    /// Payloads of Sparkplug B.
+    Sparkplug,
+    /// Drives and lines of a command line.
+    Specs,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 12] = [
         Self::Rtu,
         Self::Ascii,
         Self::Mbap,
@@ -54,6 +61,9 @@ impl Target {
         Self::Profile,
         Self::Control,
         Self::Words,
+        Self::Json,
+        Self::Sparkplug,
+        Self::Specs,
     ];
 
     /// One execution with the numbers of a seed.
@@ -75,6 +85,9 @@ impl Target {
             Self::Profile => readers::profile(&mut rng),
             Self::Control => readers::control(&mut rng),
             Self::Words => readers::words(&mut rng),
+            Self::Json => messages::json(&mut rng),
+            Self::Sparkplug => messages::sparkplug(&mut rng),
+            Self::Specs => messages::specs(&mut rng),
         });
         panic::catch_unwind(run).unwrap_or_else(|panic| {
             let said = panic.downcast_ref::<String>().cloned();

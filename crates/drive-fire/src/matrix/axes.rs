@@ -11,6 +11,8 @@ use drive_families::{Family, SetUp};
 use drive_profile::{definition, shipped};
 use drive_sim::Surroundings;
 
+use super::Untold;
+
 /// The profiles whose drives reach motion and have a simulated twin.
 const PROFILES: [&str; 5] = ["danfoss-fc", "goodrive", "ig5a", "v20", "danfoss-fc51"];
 
@@ -157,18 +159,20 @@ impl FarEnd {
         Self::GoesMute,
     ];
 
-    /// Why what is wrong behind it cannot be told from what is right, where a fault has `struck` besides, if it cannot.
+    /// What comes of it, where a fault has `struck` besides, and cannot be told from what is right.
     #[must_use]
-    pub fn is_beyond_telling(self, way: Way, struck: bool) -> Option<&'static str> {
+    pub fn untold(self, way: Way, struck: bool) -> Option<Untold> {
         match self {
-            Self::Caching => Some("a gateway that answers from what it has kept tells no age"),
-            Self::Twins => Some("two that answer as one"),
+            Self::Caching => {
+                Some(Untold::own_words("a gateway that answers from what it has kept tells no age"))
+            }
+            Self::Twins => Some(Untold::anything("two that answer as one")),
             Self::Doubling if way == Way::RtuOverTcp => {
-                Some("the first answer that comes twice, to a read that cannot differ")
+                Some(Untold::value("the first answer that comes twice, to a read that cannot differ"))
             }
-            Self::SecondMaster if struck => {
-                Some("the answer to a second master is struck, of which nobody knows any more whose it is")
-            }
+            Self::SecondMaster if struck => Some(Untold::value(
+                "the answer to a second master is struck, of which nobody knows any more whose it is",
+            )),
             _ => None,
         }
     }

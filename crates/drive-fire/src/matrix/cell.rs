@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use super::{Event, FarEnd, Fault, Operation, Subject, Way};
+use super::{Event, FarEnd, Fault, Operation, Subject, Untold, Way};
 
 /// At which exchange of the operation the fault strikes: the first, the second, the third or the fifth.
 pub(super) const PLACES: [usize; 4] = [0, 1, 2, 4];
@@ -133,12 +133,10 @@ impl Cell {
         format!("{}:{}", self.plane.letter(), self.number)
     }
 
-    /// Why nobody at this end of the way can tell what is wrong from what is right, if nobody can: the
-    /// README of drive-bus lists them.
-    #[must_use]
-    pub fn is_beyond_telling(&self) -> Option<&'static str> {
-        let of_far_end = self.far_end.is_beyond_telling(self.way, self.fault != Fault::None);
-        of_far_end.or_else(|| self.fault.is_beyond_telling(self.way, self.far_end == FarEnd::Fast))
+    /// What nobody at this end of the way can tell from what is right: the README of drive-bus lists it.
+    pub fn untold(&self) -> impl Iterator<Item = Untold> {
+        let of_far_end = self.far_end.untold(self.way, self.fault != Fault::None);
+        of_far_end.into_iter().chain(self.fault.untold(self.way, self.far_end == FarEnd::Fast))
     }
 
     /// Why it cannot exist, or is another one; `None`: it can.

@@ -3,7 +3,7 @@
 
 use std::{fmt, time::Duration};
 
-use super::Way;
+use super::{Untold, Way};
 
 /// A fault of one exchange.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -192,38 +192,40 @@ impl Fault {
         }
     }
 
-    /// Whether what comes of it, `fast` or in the time of the line, cannot be told from what is right, by anything that this way carries; why.
+    /// What comes of it, `fast` or in the time of the line, and cannot be told from what is right by anything that this way carries.
     #[must_use]
-    pub fn is_beyond_telling(self, way: Way, fast: bool) -> Option<&'static str> {
-        match (self, way) {
+    pub fn untold(self, way: Way, fast: bool) -> Option<Untold> {
+        Some(match (self, way) {
             (
                 Self::ReplayInstead | Self::ReplayBefore,
                 Way::Rtu | Way::Ascii | Way::RtuOverTcp | Way::UniTelway,
-            ) => Some("an earlier answer of the same shape, in time, where nothing is numbered"),
-            (Self::Exception(1 | 6), _) => Some(
+            ) => Untold::answer("an earlier answer of the same shape, in time, where nothing is numbered"),
+            (Self::Exception(1 | 6), _) => Untold::own_words(
                 "a drive that says that it has done nothing, and has (Modbus Application Protocol, section 7)",
             ),
             (Self::Double(_), Way::Rtu | Way::Ascii | Way::RtuOverTcp) => {
-                Some("the first answer that comes twice, to a read that cannot differ")
+                Untold::value("the first answer that comes twice, to a read that cannot differ")
             }
             (Self::Late(700..), Way::Rtu | Way::Ascii | Way::RtuOverTcp) => {
-                Some("an answer later than the late window, to a read that cannot differ")
+                Untold::value("an answer later than the late window, to a read that cannot differ")
             }
-            (Self::EchoAlone, way) if fast || way == Way::Ascii => {
-                Some("the first echo of an adapter that had never echoed, where time proves nothing")
-            }
-            (Self::Flipped(2..) | Self::RequestFlipped, Way::Ascii) => {
-                Some("two turned bits can cancel each other out in the LRC")
+            (Self::EchoAlone, _) if fast => Untold::confirmation(
+                "the first echo of an adapter that had never echoed, where time proves nothing",
+            ),
+            (Self::Flipped(2..), Way::Ascii) => {
+                Untold::answer("two turned bits can cancel each other out in the LRC")
             }
             (Self::Flipped(2..), Way::UniTelway) => {
-                Some("two turned bits can cancel each other out in the BCC")
+                Untold::answer("two turned bits can cancel each other out in the BCC")
             }
-            (Self::Flipped(4..), _) => Some("four turned bits can give a CRC that fits, one time in 65 536"),
+            (Self::Flipped(4..), _) => {
+                Untold::answer("four turned bits can give a CRC that fits, one time in 65 536")
+            }
             (Self::NoiseInside, Way::Ascii | Way::UniTelway) => {
-                Some("a byte more can cancel itself out in a sum of eight bits")
+                Untold::answer("a byte more can cancel itself out in a sum of eight bits")
             }
-            _ => None,
-        }
+            _ => return None,
+        })
     }
 
     /// How long the fault lasts, behind which everything is well again.

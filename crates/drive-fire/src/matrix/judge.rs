@@ -13,12 +13,13 @@ use drive_testing::truth::contradiction;
 use tokio::time::Instant;
 use tokio_modbus::{Request, Response, Slave, client::Client, slave::SlaveContext};
 
-use super::{Way, tap::Tap};
+use super::{Untold, Way, tap::Tap, untold::Kind};
 
 /// How much later than its lifetime a request may be heard whole: its characters on the wire, and a turn of the clock.
 const ON_THE_WIRE: Duration = Duration::from_millis(250);
 
-/// In this time a motor can be run and cut by others, or trip and coast.
+/// In this time a motor that stood can be run by others and let coast, and one that comes down can lose its supply and have it again,
+/// seen by nobody: the words are those of one that stands.
 const UNSEEN: Duration = Duration::from_millis(500);
 
 /// A ramp of these drives passes less than the tolerance of a look in this time.
@@ -30,10 +31,10 @@ pub(super) struct Notes(Arc<Mutex<Noted>>);
 
 #[derive(Debug, Default)]
 struct Noted {
-    against: Vec<String>,
-    /// When the drive told a status last.
-    looked: Option<Instant>,
-    /// Since then it was looked at again, behind a time in which it was not.
+    against: Vec<(Kind, String)>,
+    /// When the drive told a status last, and what of its motor.
+    looked: Option<(Instant, Motion)>,
+    /// Since then it was looked at again: it was told at rest or coming down before, and was not looked at for a while.
     unseen_until: Option<Instant>,
     /// A rule was broken that holds whatever the drive is told.
     breaks_a_rule: bool,
@@ -48,26 +49,35 @@ impl Notes {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// What was told of the machine, or what it does, contradicts it.
     pub(super) fn object(&self, why: String) {
-        self.noted().against.push(why);
+        self.object_to(Kind::Machine, why);
+    }
+
+    fn object_to(&self, kind: Kind, why: String) {
+        self.noted().against.push((kind, why));
     }
 
     /// What holds whatever the drive is told, and did not.
     pub(super) fn breach(&self, why: String) {
         let mut noted = self.noted();
         noted.breaks_a_rule = true;
-        noted.against.push(why);
+        noted.against.push((Kind::Machine, why));
     }
 
-    /// Whether the drive was not looked at for so long that its motor may have been run and cut unseen, and has not stood since.
+    /// Whether a drive whose motor stood, or came down, was not looked at for so long, and has not stood since: [`Motion::AtRest`] says that
+    /// what it did between two looks nobody saw. One that was driven before is to be told as coasting.
     fn lost_sight_of(&self, at: Option<Instant>) -> bool {
         self.noted().unseen_until.is_some_and(|until| at.is_none_or(|at| at >= until))
     }
 
-    /// A status was told, of a motor that turns or stands.
-    pub(super) fn looked(&self, at: Instant, turns: bool) {
+    /// A status told this of a motor that turns or stands.
+    pub(super) fn looked(&self, at: Instant, told: Motion, turns: bool) {
         let mut noted = self.noted();
-        let gap = noted.looked.replace(at).is_some_and(|before| before + UNSEEN < at);
+        let before = noted.looked.replace((at, told));
+        let gap = before.is_some_and(|(before, told)| {
+            before + UNSEEN < at && matches!(told, Motion::AtRest | Motion::Braking | Motion::Held)
+        });
         if !turns {
             noted.unseen_until = None;
         } else if gap {
@@ -75,12 +85,18 @@ impl Notes {
         }
     }
 
-    pub(super) fn breaks_a_rule(&self) -> bool {
-        self.noted().breaks_a_rule
-    }
-
-    pub(super) fn against(&self) -> Vec<String> {
-        self.noted().against.clone()
+    /// What was found, and why nobody can tell it where nobody can. What UNI-TELWAY carries is no PDU of Modbus, so that no answer is
+    /// held against the machine's there.
+    pub(super) fn verdict(
+        &self,
+        way: Way,
+        mut untold: impl Iterator<Item = Untold>,
+    ) -> (Vec<String>, Option<&'static str>) {
+        let noted = self.noted();
+        let (kinds, why): (Vec<Kind>, Vec<String>) = noted.against.iter().cloned().unzip();
+        let explains = |untold: &Untold| way == Way::UniTelway || untold.explains(&kinds);
+        let explained = if noted.breaks_a_rule { None } else { untold.find(explains) };
+        (why, explained.map(|untold| untold.why))
     }
 
     /// Edges that the machine took more often than they were given.
@@ -144,8 +160,8 @@ fn pdu(request: &Request<'_>) -> Option<Vec<u8>> {
 }
 
 impl Judged {
-    fn object(&self, why: &str, pdu: &[u8]) {
-        self.bench.notes.object(format!("{why} ({pdu:02X?})"));
+    fn object(&self, kind: Kind, why: &str, pdu: &[u8]) {
+        self.bench.notes.object_to(kind, format!("{why} ({pdu:02X?})"));
     }
 
     /// How often the machine has taken this since then, and when last.
@@ -161,10 +177,11 @@ impl Judged {
             Ok(Ok(Response::ReadHoldingRegisters(words) | Response::ReadInputRegisters(words)))
                 if !self.is_true(pdu, asked, words) =>
             {
-                self.object(&format!("a value that the machine did not give: {words:04X?}"), pdu);
+                let why = format!("a value that the machine did not give: {words:04X?}");
+                self.object(Kind::Value, &why, pdu);
             }
             Ok(Ok(_)) if writes && self.bench.way != Way::UniTelway && self.taken(pdu, asked).is_empty() => {
-                self.object("confirmed, and never taken by the machine", pdu);
+                self.object(Kind::Confirmation, "confirmed, and never taken by the machine", pdu);
             }
             Err(error) if writes && self.bench.way != Way::UniTelway => {
                 let said_unsent = matches!(error, tokio_modbus::Error::Transport(error) if error
@@ -255,7 +272,7 @@ impl Bench {
     /// What the machine has against a status that was asked for at `asked`.
     pub(super) fn judge_status(&self, status: &Status, asked: Instant, fresh: bool) {
         if let Some(at) = status.at {
-            self.notes.looked(at, self.machine.observe().shaft_frequency != 0);
+            self.notes.looked(at, status.motion, self.machine.observe().shaft_frequency != 0);
             let now = Instant::now();
             if at > now {
                 self.notes.object(format!("a status from {:?} ahead", at - now));

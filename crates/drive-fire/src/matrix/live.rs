@@ -8,7 +8,7 @@ use drive_testing::{contract::Open, truth::TOLERANCE};
 use tokio::time::{Instant, sleep, timeout};
 
 use super::{
-    Cell, Event, FarEnd, Fault, Operation, Subject, Way,
+    Cell, Event, FarEnd, Fault, Operation, Subject, Untold, Way,
     axes::parameter,
     stage::{Around, Stage},
     story::Story,
@@ -126,16 +126,13 @@ async fn play(cell: &Cell, open: &Open) -> Lived {
         Err(Error::NotConfirmed { status, .. }) => stage.bench.judge_status(status, asked, false),
         _ => {}
     }
-    let at_once = stage.bench.machine.observe();
+    let (at_once, ended) = (stage.bench.machine.observe(), Instant::now());
     let struck = stage.bench.tap.calm();
     sleep(cell.fault.lasts()).await;
     settle(&mut stage).await;
-    judge(cell, &stage, &told, &before, &at_once);
-    let mut against = stage.bench.notes.against();
-    against.truncate(4);
-    if !against.is_empty() {
-        let beyond = cell.is_beyond_telling().filter(|_| !stage.bench.notes.breaks_a_rule());
-        return beyond.map_or(Lived::Against(against), Lived::BeyondTelling);
+    judge(cell, &stage, &told, &before, (&at_once, ended));
+    if let Some(against) = against(&stage, cell.way, cell.untold()) {
+        return against;
     }
     if cell.fault != Fault::None && !struck {
         return Lived::NotReached;
@@ -144,6 +141,14 @@ async fn play(cell: &Cell, open: &Open) -> Lived {
         Ok(_) => "confirmed",
         Err(error) => word(&error),
     })
+}
+
+/// What was found against it, if anything.
+pub(super) fn against(stage: &Stage, way: Way, untold: impl Iterator<Item = Untold>) -> Option<Lived> {
+    let (mut why, explained) = stage.bench.notes.verdict(way, untold);
+    why.truncate(4);
+    let found = !why.is_empty();
+    found.then(|| explained.map_or(Lived::Against(why), Lived::BeyondTelling))
 }
 
 /// What an error is in one word.
@@ -286,7 +291,7 @@ fn judge(
     stage: &Stage,
     told: &Result<Option<Status>>,
     before: &Before,
-    at_once: &drive_sim::Observation,
+    (at_once, ended): (&drive_sim::Observation, Instant),
 ) {
     let notes = &stage.bench.notes;
     let (seen, twin) = (stage.bench.machine.observe(), stage.twin.observe());
@@ -313,7 +318,9 @@ fn judge(
         (Operation::Stop(mode), Ok(_)) if moves && !twin.running && mode != StopMode::DcInjection => {
             notes.object(format!("a stop was confirmed: {seen:?}"));
         }
-        (Operation::Start(_), Ok(_)) if !at_once.running && cell.event == Event::Nothing => {
+        (Operation::Start(_), Ok(status))
+            if !at_once.running && cell.event == Event::Nothing && !is_of_before(status.as_ref(), ended) =>
+        {
             notes.object(format!("a start was confirmed: {at_once:?}"));
         }
         (Operation::Start(_), Err(error))
@@ -326,6 +333,11 @@ fn judge(
         }
         _ => {}
     }
+}
+
+/// Whether a confirmation is of a second ago: it says so, and what the drive's watchdog did to one whose master stood still it does not say.
+fn is_of_before(status: Option<&Status>, ended: Instant) -> bool {
+    status.and_then(|status| status.at).is_some_and(|at| at + Duration::from_secs(1) < ended)
 }
 
 /// The rules of the line were kept, where the line that the simulator sees is the line that the master sees.

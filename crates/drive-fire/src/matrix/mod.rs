@@ -15,6 +15,7 @@ mod stage;
 pub mod story;
 mod tap;
 mod telling;
+mod untold;
 
 use std::{collections::BTreeMap, time::Instant};
 
@@ -22,9 +23,10 @@ pub use axes::{Event, FarEnd, Operation, Subject, Way};
 pub use cell::{Cell, Plane};
 pub use fault::Fault;
 pub use live::{Lived, live, tell};
-pub use plants::find_plants;
+pub use plants::{find_again, find_plants};
+pub use untold::Untold;
 
-use crate::report::{Find, Told};
+use crate::report::{self, Find, Told};
 
 /// The drive of a cell as its family makes it.
 #[must_use]
@@ -74,6 +76,7 @@ pub fn run(seed: u64, of_each: u64, mut go_on: impl FnMut() -> bool) -> Told {
                 continue;
             }
             lived += 1;
+            report::begins(&cell);
             match live(&cell, &*open(&cell)) {
                 Lived::Told(word) => {
                     told.count += 1;

@@ -9,10 +9,8 @@ use drive_testing::{
     mutants::Mutant,
 };
 
-#[cfg(feature = "plants")]
-use super::open;
-use super::{Cell, Lived, Plane, live, shuffled};
-use crate::report::{Plant, Told};
+use super::{Cell, Lived, Plane, live, open, shuffled};
+use crate::report::{Find, Plant, Told};
 
 /// The ways in which a family breaks its contract that show in what it says and does, and not only in how it asks.
 const OF_A_FAMILY: [Mutant; 10] = [
@@ -52,39 +50,91 @@ fn broken(mutant: Mutant, cell: &Cell) -> Box<Open> {
     mutant.of(Contract { control, ..whole }).open
 }
 
-/// Attacks each planted defect with the cells of the whole until one finds it, at most so many cells.
-pub fn find_plants(seed: u64, at_most: usize) -> Told {
+/// Attacks each planted defect, or `only` this one, with the cells of the whole until one finds it, at most so many cells.
+pub fn find_plants(seed: u64, at_most: usize, only: Option<&str>) -> Told {
     let begun = Instant::now();
     let mut told = Told::new("fault matrix, against planted defects", "cells");
-    for mutant in OF_A_FAMILY {
-        let found_by = attack(seed, at_most, &mut told.count, &|cell| broken(mutant, cell));
-        told.plants.push(Plant { name: format!("family: {mutant:?}"), found_by });
-    }
-    #[cfg(feature = "plants")]
-    for mutant in drive_bus::mutants::ALL {
-        let _chosen = drive_bus::mutants::choose(mutant.name);
-        let found_by = attack(seed, at_most, &mut told.count, &|cell| open(cell));
-        let reached = drive_bus::mutants::was_reached(mutant.name);
-        let name =
-            format!("line: {}{}", mutant.name, if reached { "" } else { " (its line was never reached)" });
-        told.plants.push(Plant { name, found_by });
+    for (name, plant) in all().filter(|(name, _)| only.is_none_or(|only| only == name)) {
+        let can_exist = |plane| shuffled(plane, seed).filter(|cell: &Cell| cell.cannot_exist().is_none());
+        let mut planes = Plane::ALL.map(can_exist);
+        let (mut found_by, mut was_reached) = (None, false);
+        for turn in 0..at_most {
+            let Some(cell) = planes[turn % planes.len()].next() else { break };
+            told.count += 1;
+            let (lived, reached) = plant.live(&cell);
+            was_reached |= reached;
+            if let Lived::Against(why) = lived {
+                let why: String =
+                    why.first().map(String::as_str).unwrap_or_default().chars().take(90).collect();
+                found_by = Some(format!("{} after {} cells: {why}", cell.name(), turn + 1));
+                break;
+            }
+        }
+        let name = format!("{name}{}", if was_reached { "" } else { " (its line was never reached)" });
+        let plant = Plant { name, found_by };
+        eprintln!("{plant:?}");
+        told.plants.push(plant);
     }
     told.took = begun.elapsed();
     told
 }
 
-/// The first cell that finds it, turn by turn from each plane.
-fn attack(seed: u64, at_most: usize, count: &mut u64, opened: &dyn Fn(&Cell) -> Box<Open>) -> Option<String> {
-    let can_exist = |plane| shuffled(plane, seed).filter(|cell: &Cell| cell.cannot_exist().is_none());
-    let mut planes = Plane::ALL.map(can_exist);
-    for turn in 0..at_most {
-        let cell = planes[turn % planes.len()].next()?;
-        *count += 1;
-        if let Lived::Against(why) = live(&cell, &*opened(&cell)) {
-            let why = why.first().map(String::as_str).unwrap_or_default();
-            let short: String = why.chars().take(90).collect();
-            return Some(format!("{} after {} cells: {short}", cell.name(), turn + 1));
+/// Each of these planted defects, against the cell that has found it once, which is sound without it.
+pub fn find_again(found: &[(&str, &str)]) -> Told {
+    let begun = Instant::now();
+    let mut told = Told::new("fault matrix, against planted defects", "cells");
+    for (name, by) in found {
+        let plant = all().find(|(known, _)| known == name).map(|(_, plant)| plant);
+        let (Some(plant), Some(cell)) = (plant, Cell::named(by)) else {
+            told.finds.push(Find {
+                what: format!("{name} is no plant here, or {by} no cell"),
+                replay: String::new(),
+            });
+            continue;
+        };
+        told.count += 1;
+        let is_found = matches!(plant.live(&cell).0, Lived::Against(_));
+        if let Lived::Against(why) = live(&cell, &*open(&cell)) {
+            let replay = format!("drive-fire matrix --cell {by}");
+            told.finds
+                .push(Find { what: format!("{cell} without a plant\n    {}", why.join("\n    ")), replay });
+        }
+        told.plants.push(Plant { name: (*name).to_owned(), found_by: is_found.then(|| (*by).to_owned()) });
+    }
+    told.took = begun.elapsed();
+    told
+}
+
+/// A planted defect.
+#[derive(Debug, Clone, Copy)]
+enum Planted {
+    Family(Mutant),
+    #[cfg(feature = "plants")]
+    Line(&'static str),
+}
+
+fn all() -> impl Iterator<Item = (String, Planted)> {
+    let families = OF_A_FAMILY.map(|mutant| (format!("family: {mutant:?}"), Planted::Family(mutant)));
+    #[cfg(feature = "plants")]
+    let lines = drive_bus::mutants::ALL
+        .iter()
+        .map(|mutant| (format!("line: {}", mutant.name), Planted::Line(mutant.name)));
+    #[cfg(not(feature = "plants"))]
+    let lines = std::iter::empty();
+    families.into_iter().chain(lines)
+}
+
+impl Planted {
+    /// The cell with this defect, and whether its line was reached.
+    fn live(self, cell: &Cell) -> (Lived, bool) {
+        match self {
+            Self::Family(mutant) => (live(cell, &*broken(mutant, cell)), true),
+            #[cfg(feature = "plants")]
+            Self::Line(name) => {
+                // Chosen anew for each cell: what goes round without end in one of them is ended.
+                let _chosen = drive_bus::mutants::choose(name);
+                (live(cell, &*open(cell)), drive_bus::mutants::was_reached(name))
+            }
         }
     }
-    None
 }

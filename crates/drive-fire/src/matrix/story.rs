@@ -5,7 +5,7 @@ use std::{fmt, time::Instant};
 
 use fastrand::Rng;
 
-use super::{Event, FarEnd, Fault, Lived, Operation, Subject, Way, tell};
+use super::{Event, FarEnd, Fault, Lived, Operation, Subject, Untold, Way, tell};
 use crate::report::{Find, Told};
 
 /// What happens next.
@@ -82,16 +82,15 @@ impl Story {
         })
     }
 
-    /// Why what is wrong in it cannot be told from what is right, if it cannot.
-    #[must_use]
-    pub fn is_beyond_telling(&self) -> Option<&'static str> {
+    /// What in it nobody can tell from what is right.
+    pub fn untold(&self) -> impl Iterator<Item = Untold> {
         let fast = self.far_end == FarEnd::Fast;
-        let of_fault = self.steps.iter().find_map(|step| match step {
-            Step::Strike(fault, _) => fault.is_beyond_telling(self.way, fast),
+        let of_faults = self.steps.iter().filter_map(move |step| match step {
+            Step::Strike(fault, _) => fault.untold(self.way, fast),
             _ => None,
         });
         let struck = self.steps.iter().any(|step| matches!(step, Step::Strike(..)));
-        of_fault.or_else(|| self.far_end.is_beyond_telling(self.way, struck))
+        of_faults.chain(self.far_end.untold(self.way, struck))
     }
 
     /// The same without this step.
@@ -195,6 +194,7 @@ pub fn run(seed: u64, stories: u64, mut go_on: impl FnMut() -> bool) -> Told {
         number = number.wrapping_add(1);
         let Some(story) = Story::of(number) else { continue };
         told.count += 1;
+        crate::report::begins(&story);
         steps += story.steps.len();
         match tell(&story, &*crate::matrix::drive_of(story.subject)) {
             Lived::Against(why) => told.finds.push(found(&story, &why)),

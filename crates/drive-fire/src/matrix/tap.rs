@@ -40,6 +40,18 @@ struct Plan {
     rng: Rng,
     answered: Vec<Answered>,
     caches: bool,
+    begun: Instant,
+    traces: bool,
+}
+
+impl Plan {
+    /// With `DRIVE_FIRE_TRACE` set each exchange is told, for whoever looks at one cell.
+    fn trace(&self, answered: &Answered) {
+        if self.traces {
+            let Answered { asked, request, answer, .. } = answered;
+            eprintln!("{:8.3} s {request:02X?} {answer:02X?}", (*asked - self.begun).as_secs_f64());
+        }
+    }
 }
 
 /// The hand: clones share it.
@@ -60,6 +72,8 @@ impl Tap {
             rng: Rng::with_seed(seed),
             answered: Vec::new(),
             caches,
+            begun: Instant::now(),
+            traces: std::env::var_os("DRIVE_FIRE_TRACE").is_some(),
         };
         Self { way, plan: Arc::new(Mutex::new(plan)) }
     }
@@ -270,6 +284,7 @@ impl Cable {
                     answer: answer.pdu.clone(),
                 };
                 let mut plan = self.tap.plan();
+                plan.trace(&answered);
                 // Long runs need the last of them only.
                 if plan.answered.len() >= 512 {
                     plan.answered.drain(..256);

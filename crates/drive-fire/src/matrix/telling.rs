@@ -8,7 +8,7 @@ use tokio::time::{Instant, sleep, timeout};
 
 use super::{
     Fault, Operation,
-    live::{Asks, Lived, PATIENCE, SETPOINT, operate, poll_for},
+    live::{Asks, Lived, PATIENCE, SETPOINT, against, operate, poll_for},
     stage::{Around, Site, Stage},
     story::{Step, Story},
 };
@@ -56,13 +56,7 @@ pub(super) async fn tell(story: &Story, open: &Open) -> Lived {
     sleep(story.steps.iter().map(lasts).max().unwrap_or_default()).await;
     poll_for(&mut stage, Duration::from_secs(8)).await;
     at_the_end(&stage, &done);
-    let mut against = stage.bench.notes.against();
-    against.truncate(4);
-    if against.is_empty() {
-        return Lived::Told("told");
-    }
-    let beyond = story.is_beyond_telling().filter(|_| !stage.bench.notes.breaks_a_rule());
-    beyond.map_or(Lived::Against(against), Lived::BeyondTelling)
+    against(&stage, story.way, story.untold()).unwrap_or(Lived::Told("told"))
 }
 
 /// Asks, and judges what is told at once. `None`: it does not end.

@@ -1,5 +1,6 @@
 //! Model checking: small cases explored to the end.
 
+pub mod lease;
 pub mod master;
 
 use std::time::Instant;

@@ -38,7 +38,12 @@ impl Supervisor {
         let why = match self.checks.identity() {
             IdentityCheck::Unchecked => return,
             _ if !self.settings.control => "the drive is only read",
-            _ if self.says_what_it_is() == record.identity && !self.checks.is_another() => {
+            _ if crate::mutant!(
+                "run-of-another-drive-adopted",
+                self.says_what_it_is() == record.identity && !self.checks.is_another(),
+                true
+            ) =>
+            {
                 self.adoption = Adoption::Due(record.lease);
                 return self.pace.hurry(now);
             }
@@ -85,7 +90,11 @@ impl Supervisor {
         if !matches!(self.adoption, Adoption::Asked) {
             return false;
         }
-        match (self.lease, verdict) {
+        match crate::mutant!(
+            "run-adopted-unseen",
+            (self.lease, verdict),
+            (self.lease, Some(Verdict::InForce))
+        ) {
             (Some(_), None | Some(Verdict::NotKnown)) => false,
             (Some(lease), Some(_)) => {
                 self.adoption = Adoption::Decided;

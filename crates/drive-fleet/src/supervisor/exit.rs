@@ -49,7 +49,9 @@ impl Supervisor {
         }
         self.exits_by = why;
         self.refuse_queue();
-        let started = (self.lease.is_some() || self.is_starting()) && !self.checks.is_another();
+        let started = (crate::mutant!("lease-forgotten-at-exit", self.lease.is_some(), false)
+            || self.is_starting())
+            && !self.checks.is_another();
         // Rule 1 ends with its confirmation, whatever the policy.
         let stopping = self.stopping.is_some();
         let turns = self.turns();
@@ -110,7 +112,11 @@ impl Supervisor {
     /// A command of the exit has ended.
     pub(super) fn exit_concluded(&mut self, outcome: &Outcome) {
         match self.exit {
-            Exit::Stopping { release: true } if outcome.is_confirmed() => self.exit = Exit::Release,
+            Exit::Stopping { release: true }
+                if crate::mutant!("released-without-standstill", outcome.is_confirmed(), true) =>
+            {
+                self.exit = Exit::Release;
+            }
             Exit::Stopping { .. } => self.exit_ends(ExitAction::Stopped(outcome.clone())),
             Exit::Releasing => self.exit_ends(ExitAction::Released(outcome.clone())),
             Exit::No | Exit::Release | Exit::Restoring { .. } | Exit::Done(_) => {}

@@ -77,7 +77,7 @@ impl Supervisor {
 
     /// Why nobody of this name may give this order now.
     fn refuse_commander(&self, name: Option<&str>, order: &Order) -> Option<Refused> {
-        if !self.settings.control {
+        if crate::mutant!("read-only-moved", !self.settings.control, false) {
             return Some(Refused::ReadOnly);
         }
         if self.is_exiting() {
@@ -86,7 +86,9 @@ impl Supervisor {
         if let Some(name) = name.filter(|name| !self.settings.commanders.allow(name)) {
             return Some(Refused::Commander(name.to_owned()));
         }
-        (self.stopping.is_some() && *order != Order::AcceptIdentity).then_some(Refused::StopPending)
+        (crate::mutant!("start-amid-a-stop", self.stopping.is_some(), false)
+            && *order != Order::AcceptIdentity)
+            .then_some(Refused::StopPending)
     }
 
     pub(super) fn refuse_at_once(
@@ -102,7 +104,9 @@ impl Supervisor {
         if let Some(refused) = self.refuse_commander(name, order) {
             return Some(refused);
         }
-        if leave.is_some_and(|leave| leave.stops != self.stops) {
+        let is_over =
+            |leave: Leave| crate::mutant!("leave-outlives-a-stop", leave.stops != self.stops, false);
+        if leave.is_some_and(is_over) {
             return Some(Refused::Stopped);
         }
         (self.queue.len() >= QUEUE).then_some(Refused::QueueFull)
@@ -156,14 +160,19 @@ impl Supervisor {
     /// What holds for everything that is written: the drive is there, its status is fresh, and it is the one that is
     /// meant (rules 4 and 7).
     fn allow_writing(&self, now: Instant, order: Order) -> Result<(), Blocked> {
-        if self.link != Link::Connected {
+        if crate::mutant!("lost-drive-moved", self.link != Link::Connected, false) {
             return Err(Refused::NotConnected.into());
         }
         let max_age = self.settings.periods.max_age;
-        if self.retraction.is_open || self.status.as_ref().is_none_or(|status| status.age(now) > max_age) {
+        if self.retraction.is_open
+            || self
+                .status
+                .as_ref()
+                .is_none_or(|status| crate::mutant!("stale-status-moves", status.age(now) > max_age, false))
+        {
             return Err(Blocked::Meanwhile(Refused::Stale));
         }
-        match self.checks.stranger() {
+        match crate::mutant!("stranger-moved", self.checks.stranger(), None) {
             None => Ok(()),
             Some(Refused::IdentityChanged) if order == Order::AcceptIdentity => Ok(()),
             Some(unchecked @ Refused::IdentityUnchecked) => Err(match self.checks.identity_job(now) {
@@ -177,12 +186,12 @@ impl Supervisor {
     /// What holds for motion besides: a state that the manual explains, no fault, the watchdog armed. Who has control is
     /// for the family to judge, which reads it anew before a start: on some drives a command of the bus takes it.
     fn allow_motion(&self, now: Instant, status: &Status, active: Option<&Active>) -> Result<(), Blocked> {
-        if let Some(reason) = status.bars_motion() {
+        if let Some(reason) = crate::mutant!("fault-moved", status.bars_motion(), None) {
             return Err(reason.into());
         }
         let unverified = Refused::WatchdogUnverified;
         match self.checks.watchdog() {
-            check if check.allows_motion() => Ok(()),
+            check if crate::mutant!("unwatched-moved", check.allows_motion(), true) => Ok(()),
             // It is written for an order once.
             WatchdogCheck::WaitsForStandstill(_) if active.is_none_or(|active| !active.armed) => Err(self
                 .checks
@@ -199,6 +208,7 @@ impl Supervisor {
     fn allow_setpoint(&self, now: Instant, setpoint: Setpoint) -> Result<(), Refused> {
         let moving = self.status.as_ref().is_some_and(|status| !status.value.is_undriven());
         let last = self.given.filter(|_| moving);
-        self.settings.limits.allow(now, setpoint, last).map_err(Refused::Limit)
+        let allowed = self.settings.limits.allow(now, setpoint, last);
+        crate::mutant!("limit-passed", allowed, Ok(())).map_err(Refused::Limit)
     }
 }

@@ -168,7 +168,9 @@ impl Supervisor {
     pub(super) fn begin_stop(&mut self, now: Instant, asker: Asker, order: StopOrder, patience: Duration) {
         let (mode, injection) = (order.mode, order.injects_for());
         // What waits would move the motor behind its stop.
-        self.end_orders_by_stop();
+        if crate::mutant!("orders-outlive-a-stop", true, false) {
+            self.end_orders_by_stop();
+        }
         self.stops += 1;
         // Who gave the start has nothing to take back any more.
         self.started_by = None;
@@ -180,7 +182,7 @@ impl Supervisor {
         let mut waiter = Waiter { asker: asker.clone(), asked: order, asked_at: now, until, is_told: false };
         match &mut self.stopping {
             Some(stopping) => {
-                if strength(mode) > strength(stopping.asked) {
+                if crate::mutant!("stop-softened", strength(mode) > strength(stopping.asked), true) {
                     (stopping.asked, stopping.mode, stopping.used) = (mode, mode, mode);
                     stopping.taken = false;
                 }
@@ -277,7 +279,7 @@ impl Supervisor {
                 Some(status)
             }
             Err(error) => {
-                stopping.next_try = Some(now + stopping.pause);
+                stopping.next_try = crate::mutant!("stop-not-repeated", Some(now + stopping.pause), None);
                 stopping.pause = (stopping.pause * 2).min(REPEAT.1);
                 stopping.taken = false;
                 let status = status_of(&error);
@@ -308,9 +310,9 @@ impl Supervisor {
             _ if injects && injected_for.is_some_and(|time| time >= INJECTION_AT_MOST) => {
                 stopping.go_on_by_ramp(now);
             }
-            _ if !stopping.taken => {}
+            _ if crate::mutant!("untaken-stop-confirmed", !stopping.taken, false) => {}
             // A run command has come behind the stop, kept back on its way or from somebody else.
-            Motion::Driven => {
+            Motion::Driven if crate::mutant!("run-behind-a-stop-left", true, false) => {
                 stopping.taken = false;
                 stopping.next_try = Some(now);
             }
@@ -320,7 +322,8 @@ impl Supervisor {
                 }
                 self.tell_taken(at);
                 // Without an output no more is to be had: the shaft may coast.
-                if matches!(motion, Motion::Held | Motion::AtRest | Motion::Coasting) {
+                let ends = matches!(motion, Motion::Held | Motion::AtRest | Motion::Coasting);
+                if crate::mutant!("braking-told-as-standstill", ends, true) {
                     self.stop_confirmed(now, at, motion);
                 }
             }
@@ -342,8 +345,9 @@ impl Supervisor {
         let Some(mut stopping) = self.stopping.take() else { return };
         self.retraction.confirmed(at, stopping.mode);
         self.given = None;
-        let (confirmed, later): (Vec<_>, Vec<_>) =
-            stopping.waiters.drain(..).partition(|waiter| waiter.asked_at <= at);
+        let is_answered =
+            |waiter: &Waiter| crate::mutant!("older-status-confirms-a-stop", waiter.asked_at <= at, true);
+        let (confirmed, later): (Vec<_>, Vec<_>) = stopping.waiters.drain(..).partition(is_answered);
         let is_over = stopping.asked_at <= at;
         let modes = |asked| stopping.modes(asked);
         let confirmed: Vec<_> =
@@ -369,7 +373,11 @@ impl Supervisor {
 
     pub(super) fn check_stop_times(&mut self, now: Instant) {
         let Some(stopping) = &mut self.stopping else { return };
-        let alarm = stopping.alarm_at.take_if(|at| *at <= now).is_some();
+        let alarm = crate::mutant!(
+            "unconfirmed-stop-untold",
+            stopping.alarm_at.take_if(|at| *at <= now).is_some(),
+            false
+        );
         let (over, waiting): (Vec<_>, Vec<_>) =
             stopping.waiters.drain(..).partition(|waiter| waiter.until <= now);
         stopping.waiters = waiting;

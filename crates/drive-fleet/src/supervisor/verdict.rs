@@ -104,7 +104,7 @@ impl Supervisor {
             Err(error) if error.kind() == ErrorKind::NotConfirmed => {
                 let status = status_of(&error);
                 self.end_order(Outcome::NotConfirmed(Unconfirmed::Denied(error)));
-                if let Job::Start(_) = job {
+                if crate::mutant!("denied-start-stands", matches!(job, Job::Start(_)), false) {
                     self.withdraw_start(now);
                 }
                 if let Some(status) = status {
@@ -170,7 +170,7 @@ impl Supervisor {
     /// What the family says of a start whose answer was lost, so long after it.
     fn judge_lost_start(&mut self, now: Instant, status: &Status, after: Duration, denied: Option<Outcome>) {
         let Some(active) = &self.active else { return };
-        match status.verdict {
+        match crate::mutant!("lost-start-believed", status.verdict, Some(Verdict::InForce)) {
             Some(Verdict::InForce) => {
                 let done = active.order.done(Some(status));
                 match active.order {
@@ -213,7 +213,9 @@ impl Supervisor {
         let (asked, error) = (*asked, error.clone());
         match &result {
             Err(_) => *again = now + READ_AGAIN,
-            Ok(Measurements { reference: Some(reference), .. }) if *reference == asked => {
+            Ok(Measurements { reference: Some(reference), .. })
+                if crate::mutant!("any-reference-believed", *reference == asked, true) =>
+            {
                 self.setpoint_given(now, asked);
             }
             Ok(Measurements { reference: Some(_), .. }) => {
@@ -230,7 +232,7 @@ impl Supervisor {
         let Some(active) = &self.active else { return };
         let outcome = match &active.phase {
             Phase::Verifying { error, until, seen, .. } if *until <= now => {
-                if *seen {
+                if crate::mutant!("unseen-told-as-denied", *seen, true) {
                     Outcome::NotConfirmed(Unconfirmed::Denied(error.clone()))
                 } else {
                     self.unknown(now, Some(error.clone()))
@@ -245,7 +247,7 @@ impl Supervisor {
         };
         let start = matches!(active.phase, Phase::Verifying { job: Job::Start(_), .. });
         self.end_order(outcome);
-        if start {
+        if crate::mutant!("unshown-start-stands", start, false) {
             self.withdraw_start(now);
         }
     }
@@ -279,7 +281,13 @@ fn shows(job: Job, status: &Status) -> bool {
 fn denied(error: &Error) -> Option<Outcome> {
     match error {
         Error::Port { problem: PortError::Expired, .. } => Some(Outcome::Expired),
-        error if matches!(error.kind(), ErrorKind::NotSent | ErrorKind::Exception) => {
+        error
+            if crate::mutant!(
+                "lost-answer-told-as-refused",
+                matches!(error.kind(), ErrorKind::NotSent | ErrorKind::Exception),
+                true
+            ) =>
+        {
             Some(Outcome::Refused(Refused::Drive(error.clone())))
         }
         _ => None,

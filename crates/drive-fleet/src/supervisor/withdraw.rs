@@ -63,7 +63,9 @@ impl Supervisor {
             Some(Verdict::InForce) => {
                 (self.suspended, self.reported) = (None, false);
                 // It could not be withdrawn, and acts again now.
-                if let Some(withdrawal) = self.withdrawal.take() {
+                let acts = self.withdrawal.take();
+                if let Some(withdrawal) = crate::mutant!("run-that-acts-again-left", acts, None::<Withdrawal>)
+                {
                     self.stop_by_policy(now, withdrawal.asker, StopMode::Ramp);
                 }
             }
@@ -109,7 +111,11 @@ impl Supervisor {
 
     fn withdraw(&mut self, now: Instant, policy: Policy) {
         let is_another = self.checks.is_another();
-        if self.settings.control && !is_another && !self.ends_by_itself() && self.withdrawal.is_none() {
+        if self.settings.control
+            && !is_another
+            && !self.ends_by_itself()
+            && crate::mutant!("suspended-run-stands", self.withdrawal.is_none(), false)
+        {
             let asker = Asker::Policy(policy);
             let alarm_at = Some(now + self.settings.times.stop_alarm);
             self.withdrawal =
@@ -136,7 +142,9 @@ impl Supervisor {
                 // Of what did not stand nobody says that it was withdrawn.
                 let outcome = match withdrawn {
                     Withdrawn::Ended(_) => Outcome::Confirmed,
-                    Withdrawn::Nothing(_) => Outcome::NothingStood,
+                    Withdrawn::Nothing(_) => {
+                        crate::mutant!("nothing-told-as-withdrawn", Outcome::NothingStood, Outcome::Confirmed)
+                    }
                 };
                 self.conclude(asker, Command::Withdraw, None, outcome);
                 self.accept_status(now, withdrawn.into_status());

@@ -47,6 +47,18 @@ fn a_run_whose_record_the_drives_word_denies_is_not_ours_is_not_withdrawn_and_le
 }
 
 #[test]
+fn a_run_of_before_is_told_as_ours_once_the_drives_words_tell_anything_of_it() {
+    let mut rig = Rig::new(DriveSettings { run_before: record(&Rig::controlled()), ..settings() });
+    rig.drive.run();
+    (rig.stands, rig.drive.says) = (Some(RUN), Some(Verdict::NotKnown));
+    rig.pass(3_000 * MS);
+    assert_eq!(rig.times_told(&EventKind::RunAdopted(RUN)), 0, "{:?}", rig.events());
+    rig.drive.says = Some(Verdict::InForce);
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.times_told(&EventKind::RunAdopted(RUN)), 1, "{:?}", rig.events());
+}
+
+#[test]
 fn a_run_without_a_record_is_somebody_elses_whatever_word_stands() {
     let mut rig = restarted(None, Some(RUN));
     assert!(!rig.snapshot().started_here());

@@ -286,6 +286,33 @@ fn a_status_is_as_old_as_the_exchange_that_brought_it_and_not_as_its_call() {
     assert_eq!(snapshot.freshness(read + snapshot.max_age + MS), Freshness::Stale);
 }
 
+/// Rule 4.
+#[test]
+fn a_status_that_is_older_than_it_may_be_moves_nothing() {
+    let rig = Rig::ready();
+    let snapshot = rig.snapshot();
+    let read = snapshot.status.as_ref().map(|status| status.at).unwrap();
+    let refused = |at| rig.machine.leave(at, "tester", None).err();
+    assert_eq!(refused(read + snapshot.max_age), None);
+    assert_eq!(refused(read + snapshot.max_age + MS), Some(Refused::Stale));
+}
+
+#[test]
+fn a_leave_to_start_is_gone_once_a_stop_has_been_asked_for() {
+    let mut rig = Rig::ready();
+    let leave = rig.machine.leave(rig.now, "tester", None).unwrap();
+    let asker = rig.asker();
+    assert_eq!(rig.machine.refuse_at_once(&asker, &START, Some(leave)), None);
+    rig.stop(StopMode::Ramp);
+    rig.pass(3_000 * MS);
+    assert_eq!(
+        rig.machine.refuse_at_once(&asker, &START, Some(leave)),
+        Some(Refused::Stopped),
+        "it is confirmed"
+    );
+    assert_eq!(rig.machine.refuse_at_once(&asker, &START, None), None);
+}
+
 #[test]
 fn a_value_that_another_answer_withdraws_is_told_is_not_good_any_more_and_moves_nothing() {
     let mut rig = Rig::ready();

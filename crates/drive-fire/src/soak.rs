@@ -1,0 +1,209 @@
+//! Days of a plant in virtual time: many lines full of drives of every family, a fault every few seconds, commands all the time. Whatever
+//! the fleet tells is held against the machines; each command ends, a stop within its time; memory does not grow with the days.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    panic::{self, AssertUnwindSafe},
+    sync::{Arc, Mutex, PoisonError},
+    time::{Duration, Instant as Clock},
+};
+
+use drive_bus::{Line, LineConfig};
+use drive_core::{Direction, Frequency, SerialSettings, StopMode, serial::CharacterFormat};
+use drive_families::{Family, SetUp};
+use drive_fleet::{DriveHandle, DriveSettings, Fleet, Outcome};
+use drive_sim::{Fault, Faults, SimLine, Wiring};
+use drive_testing::witness::Witnesses;
+use fastrand::Rng;
+use tokio::time::{Instant, sleep};
+
+use crate::report::{Find, Told};
+
+/// Something is commanded, or happens, this often on each line.
+const EVERY: Duration = Duration::from_secs(3);
+/// Every command is told by then: the longest that a fleet waits for standstill, for a reference and for what it does not know.
+const LONGEST: Duration = Duration::from_secs(240);
+/// What a plant may need more at its end than after a tenth of its time.
+const GROWTH: u64 = 48 * 1024;
+
+/// What became of the commands.
+#[derive(Debug, Default)]
+struct Kept {
+    outcomes: BTreeMap<&'static str, u64>,
+    longest_stop: Duration,
+    given: u64,
+    told: u64,
+    late: Vec<String>,
+}
+
+/// So many lines with so many drives each, for so long.
+#[derive(Debug, Clone, Copy)]
+pub struct Size {
+    /// How many lines.
+    pub lines: usize,
+    /// How many drives on each.
+    pub drives: u8,
+    /// For how long, in virtual time.
+    pub time: Duration,
+}
+
+/// Lives through it.
+///
+/// # Panics
+/// When the plant itself cannot be built.
+pub fn run(seed: u64, size: Size, go_on: impl FnMut() -> bool) -> Told {
+    let begun = Clock::now();
+    let mut told = Told::new("soak", "hours of a plant");
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
+    let runtime = runtime.expect("a runtime of one thread");
+    let mut witnesses = Witnesses::default();
+    let lived = runtime.block_on(live(seed, size, &mut witnesses, &mut told, go_on));
+    told.count = lived.as_secs() / 3_600;
+    // They tell what they have seen by a panic.
+    let seen = panic::catch_unwind(AssertUnwindSafe(|| drop(witnesses)));
+    if let Err(panic) = seen {
+        let what = panic.downcast_ref::<String>().cloned().unwrap_or_default();
+        let what: String = what.chars().take(3_000).collect();
+        told.finds.push(Find { what, replay: format!("drive-fire soak --seed {seed}") });
+    }
+    told.took = begun.elapsed();
+    told
+}
+
+async fn live(
+    seed: u64,
+    size: Size,
+    witnesses: &mut Witnesses,
+    told: &mut Told,
+    mut go_on: impl FnMut() -> bool,
+) -> Duration {
+    let mut rng = Rng::with_seed(seed);
+    let settings = SerialSettings::new(19_200, CharacterFormat::F8N1).expect("it is a speed");
+    let mut builder = Fleet::builder().whatever_the_plan();
+    let mut sites = Vec::new();
+    for number in 0..size.lines {
+        let simulated = SimLine::new(Wiring::rtu(settings));
+        let line = Line::over(simulated.in_memory(), LineConfig::stream(settings));
+        let name = format!("line {number}");
+        builder = builder.line(name.clone(), line);
+        for address in 1..=size.drives {
+            let family = Family::BUILT_IN[usize::from(address) % Family::BUILT_IN.len()];
+            let machine = family.machine(SetUp::ForTheBus).expect("it has a twin");
+            simulated.add_boxed(address, machine).expect("the address is free");
+            let drive = DriveSettings::controlled(format!("{number}/{address}"));
+            builder = builder.drive(&name, address, drive, |port, slave| {
+                family.open_with(port, slave, &family.simulated_options())
+            });
+        }
+        simulated.set_faults(faults(rng.u64(..)));
+        sites.push((name, simulated));
+    }
+    let fleet = builder.start().expect("whatever the plan");
+    *witnesses = Witnesses::of_fleet(&fleet, sites.iter().map(|(name, line)| (&**name, line)));
+    let kept = Arc::new(Mutex::new(Kept::default()));
+    let (begun, mut early) = (Instant::now(), None);
+    while begun.elapsed() < size.time && go_on() {
+        for (name, simulated) in &sites {
+            let drives = fleet.drives_on(name);
+            let drive = &drives[rng.usize(..drives.len())];
+            match rng.u8(..10) {
+                0 => happens(&mut rng, simulated, drive),
+                _ => command(&mut rng, drive, &kept),
+            }
+        }
+        sleep(EVERY).await;
+        if early.is_none() && begun.elapsed() * 10 > size.time {
+            early = memory();
+        }
+    }
+    let lived = begun.elapsed();
+    // All is well again, and everything stops.
+    for (_, simulated) in &sites {
+        simulated.set_faults(Faults::default());
+    }
+    let stops: Vec<_> = fleet.drives().iter().map(|drive| drive.stop(StopMode::Ramp)).collect();
+    let mut ends = BTreeMap::<&str, u64>::new();
+    for stop in stops {
+        *ends.entry(word(&stop.finished().await)).or_default() += 1;
+    }
+    told.details.push(format!("at the end each is stopped: {ends:?}"));
+    sleep(LONGEST).await;
+    let kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+    told.details.extend(kept.outcomes.iter().map(|(what, count)| format!("{count:>8} {what}")));
+    told.details.push(format!("longest stop until it was told: {:.1} s", kept.longest_stop.as_secs_f64()));
+    let mut find =
+        |what: String| told.finds.push(Find { what, replay: format!("drive-fire soak --seed {seed}") });
+    if kept.told != kept.given {
+        find(format!("{} of {} commands were told", kept.told, kept.given));
+    }
+    kept.late.iter().take(4).for_each(|late| find(late.clone()));
+    if let (Some(early), Some(end)) = (early, memory()) {
+        if end > early + GROWTH {
+            find(format!("{early} KiB after a tenth of the time, {end} KiB at its end"));
+        }
+        told.details.push(format!("{early} KiB after a tenth of the time, {end} KiB at its end"));
+    }
+    drop(fleet.shutdown(Duration::from_secs(60)).await);
+    lived
+}
+
+/// One exchange in some fifty is struck.
+fn faults(seed: u64) -> Faults {
+    let kinds =
+        [Fault::RequestFlipped, Fault::Flipped, Fault::Lost, Fault::Truncated, Fault::Noise, Fault::Late];
+    kinds.into_iter().fold(Faults::seeded(seed), |faults, kind| faults.with(kind, 3_500))
+}
+
+fn happens(rng: &mut Rng, simulated: &SimLine, drive: &DriveHandle) {
+    let Some(machine) = simulated.slave(drive.slave().number()) else { return };
+    let deed = ["panel stop", "motor-supply off", "motor-supply on", "power cycle"][rng.usize(..4)];
+    // What a model does not take does not happen to it.
+    let _ = simulated.control(&format!("{} {deed}", machine.name()));
+}
+
+fn command(rng: &mut Rng, drive: &DriveHandle, kept: &Arc<Mutex<Kept>>) {
+    let frequency = Frequency::from_hertz(rng.u16(15..45));
+    let given = Instant::now();
+    let is_stop = matches!(rng.u8(..8), 0 | 1);
+    let (kept, name) = (Arc::clone(kept), drive.name().to_string());
+    kept.lock().unwrap_or_else(PoisonError::into_inner).given += 1;
+    let drive = drive.clone();
+    let order = rng.u8(..8);
+    drop(tokio::spawn(async move {
+        let outcome = match order {
+            _ if is_stop => drive.stop(StopMode::Ramp).finished().await,
+            0..=3 => drive.start_at(Direction::Forward, frequency).finished().await,
+            4 => drive.reset_faults().finished().await,
+            _ => drive.set_setpoint(frequency).finished().await,
+        };
+        let took = given.elapsed();
+        let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.told += 1;
+        *kept.outcomes.entry(word(&outcome)).or_default() += 1;
+        if is_stop {
+            kept.longest_stop = kept.longest_stop.max(took);
+        }
+        if took > LONGEST {
+            kept.late.push(format!("{name}: told after {took:?}: {outcome}"));
+        }
+    }));
+}
+
+const fn word(outcome: &Outcome) -> &'static str {
+    match outcome {
+        Outcome::Confirmed | Outcome::Stopped(_) => "confirmed",
+        Outcome::Refused(_) => "refused",
+        Outcome::NotConfirmed(_) => "not confirmed",
+        Outcome::OutcomeUnknown(_) => "outcome unknown",
+        Outcome::Expired => "expired",
+        _ => "another outcome",
+    }
+}
+
+/// What this process holds in memory, in KiB; `None`: this system does not say.
+fn memory() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    line.split_whitespace().next()?.parse().ok()
+}
