@@ -142,6 +142,7 @@ fn root() -> PathBuf {
 }
 
 /// A cell that goes round in virtual time is named, and ends the program.
+#[allow(clippy::disallowed_methods, reason = "a thread of its own, beside the runtime that may be stuck")]
 fn end_what_is_stuck() {
     thread::spawn(|| {
         loop {

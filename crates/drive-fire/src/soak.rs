@@ -129,6 +129,8 @@ async fn live(
     }
     told.details.push(format!("at the end each is stopped: {ends:?}"));
     sleep(LONGEST).await;
+    let end = memory();
+    drop(fleet.shutdown(Duration::from_secs(60)).await);
     let kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
     told.details.extend(kept.outcomes.iter().map(|(what, count)| format!("{count:>8} {what}")));
     told.details.push(format!("longest stop until it was told: {:.1} s", kept.longest_stop.as_secs_f64()));
@@ -138,13 +140,12 @@ async fn live(
         find(format!("{} of {} commands were told", kept.told, kept.given));
     }
     kept.late.iter().take(4).for_each(|late| find(late.clone()));
-    if let (Some(early), Some(end)) = (early, memory()) {
+    if let (Some(early), Some(end)) = (early, end) {
         if end > early + GROWTH {
             find(format!("{early} KiB after a tenth of the time, {end} KiB at its end"));
         }
         told.details.push(format!("{early} KiB after a tenth of the time, {end} KiB at its end"));
     }
-    drop(fleet.shutdown(Duration::from_secs(60)).await);
     lived
 }
 

@@ -281,10 +281,13 @@ impl Gate {
             return Err(Refusal::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, why));
         }
         let path = parts.uri.path().to_owned();
-        let stops = self.stops.iter().any(|stop| fits(stop, &path));
-        let stops =
-            drive_fleet::mutant!("selected-stop-is-no-stop", stops, stops && !path.contains("/selected/"));
-        let stops = stops && parts.method == Method::POST;
+        let is_stop = self.stops.iter().any(|stop| fits(stop, &path));
+        let stops = parts.method == Method::POST
+            && drive_fleet::mutant!(
+                "selected-stop-is-no-stop",
+                is_stop,
+                is_stop && !path.contains("/selected/")
+            );
         if asking.is_for_stops() && !stops {
             let why = "all places are taken: this one is for stops";
             return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, why).after(Duration::from_secs(1)));
@@ -329,8 +332,7 @@ impl Gate {
             return Ok(self.log_out(door, &caller, &parts.headers));
         }
         let Rights { stop, operate, engineer, .. } = caller.rights;
-        let may = operate || engineer || stops && stop;
-        let may = drive_fleet::mutant!("viewer-commands", may, true);
+        let may = drive_fleet::mutant!("viewer-commands", operate || engineer || stops && stop, true);
         if !drive_fleet::mutant!("stop-wants-operate", may, operate || engineer) {
             self.note_refused(&caller, &parts);
             return Err(Refusal::lacks_right(&caller, if stops { "stop" } else { "operate" }));
