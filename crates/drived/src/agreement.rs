@@ -1,10 +1,6 @@
 //! What troubles a drive and what it does: **in the same words on every face at the same moment**.
 
-use std::{
-    path::PathBuf,
-    process::{Command, Stdio},
-    time::Duration,
-};
+use std::{path::PathBuf, process::Command, time::Duration};
 
 use axum::{
     Extension, Json, Router,
@@ -15,6 +11,7 @@ use axum::{
 };
 use drive_core::{Direction, Frequency, StopMode};
 use drive_fleet::{ConcernKind, Shows, alarms::AlarmKind};
+use drive_testing::peers;
 use http_body_util::BodyExt as _;
 use serde_json::json;
 use tokio::{
@@ -117,16 +114,8 @@ async fn of_every_pair_of_troubles_in_both_orders_the_page_tells_the_same_worst(
 
 /// A Python with Playwright beside a Chromium, or `None` with the reason printed, as in `tests/page.rs`.
 fn browser() -> Option<PathBuf> {
-    let python = PathBuf::from(std::env::var_os("DRIVED_PYTHON").unwrap_or_else(|| "python3".into()));
-    let mut asked = Command::new(&python);
-    asked.args(["-c", "import playwright"]).stderr(Stdio::null());
-    let there = asked.status().is_ok_and(|status| status.success())
-        && std::path::Path::new("/usr/bin/chromium").exists();
-    assert!(there || std::env::var_os("CI").is_none(), "CI must have Chromium and playwright");
-    if !there {
-        eprintln!("skipped: Chromium or the Python module playwright is not installed");
-    }
-    there.then_some(python)
+    let chromium = peers::is_there(peers::runs("/usr/bin/chromium", &["--version"]), "Chromium");
+    peers::python_with("playwright").filter(|_| chromium)
 }
 
 fn caller() -> Caller {

@@ -7,10 +7,11 @@ use std::{
     env,
     io::{Read as _, Write as _},
     net::{TcpListener, TcpStream},
-    process::{Command, Stdio},
+    process::Command,
     time::Duration,
 };
 
+use drive_testing::peers;
 use support::{File, Running, Sim, path};
 
 /// A daemon over 31 drives with a gateway; the last of them does not answer.
@@ -63,30 +64,12 @@ impl Daemon {
     }
 }
 
-/// Whether a peer is there; where `CI` is set it has to be, because `.ci/run` installs it.
-fn is_there(command: &mut Command, what: &str) -> bool {
-    let found = command.stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
-    assert!(found || env::var_os("CI").is_none(), "{what} is not installed, and CI must have it");
-    if !found {
-        eprintln!("skipped: {what} is not installed");
-    }
-    found
-}
-
 /// Eight at once, four by libmodbus and four by pymodbus, while the daemon polls 31 drives and one of them is dead.
 #[test]
 fn eight_strangers_at_once_get_right_answers_or_the_right_exception() {
     let python = env::var_os("DRIVED_PYTHON").unwrap_or_else(|| "python3".into());
-    let has_mbpoll = is_there(Command::new("mbpoll").arg("-V"), "mbpoll");
-    let has_pymodbus = {
-        let found = Command::new(&python).args(["-c", "import pymodbus"]).stderr(Stdio::null()).status();
-        let found = found.is_ok_and(|status| status.success());
-        assert!(found || env::var_os("CI").is_none(), "pymodbus is not installed, and CI must have it");
-        if !found {
-            eprintln!("skipped: pymodbus is not installed");
-        }
-        found
-    };
+    let has_mbpoll = peers::is_there(peers::runs("mbpoll", &["-V"]), "mbpoll");
+    let has_pymodbus = peers::python_with("pymodbus").is_some();
     let daemon = Daemon::start("strangers", "");
     let port = daemon.port.to_string();
     std::thread::scope(|scope| {

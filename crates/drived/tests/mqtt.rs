@@ -228,8 +228,8 @@ fn a_broker_is_verified_and_its_access_list_as_the_readme_has_it_keeps_commander
     let add = format!(
         "touch {file}; for user in drived hmi panel homeassistant; do mosquitto_passwd -b {file} $user $user-secret; done"
     );
-    if !users.args(["-c", &add]).status().is_ok_and(|status| status.success()) {
-        assert!(std::env::var_os("CI").is_none(), "mosquitto_passwd works");
+    let added = users.args(["-c", &add]).status().is_ok_and(|status| status.success());
+    if !drive_testing::peers::is_there(added, "mosquitto_passwd") {
         return;
     }
     let Some(broker) = Mosquitto::with(

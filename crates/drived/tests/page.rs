@@ -6,7 +6,6 @@
 mod support;
 
 use std::{
-    env,
     io::{BufRead as _, BufReader},
     net::TcpListener,
     path::{Path, PathBuf},
@@ -14,6 +13,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
+use drive_testing::peers;
 use support::{File, Running, Sim, path, run};
 
 /// One browser at a time is enough for a machine with two processors.
@@ -308,20 +308,6 @@ fn look_with(
 
 /// A Python with Playwright beside a Chromium, or `None` with the reason printed. `DRIVED_PYTHON` names the interpreter.
 fn python() -> Option<PathBuf> {
-    let python = PathBuf::from(env::var_os("DRIVED_PYTHON").unwrap_or_else(|| "python3".into()));
-    let there = runs(Command::new(&python).args(["-c", "import playwright, axe_playwright_python"]))
-        && runs(Command::new("/usr/bin/chromium").arg("--version"));
-    assert!(
-        there || env::var_os("CI").is_none(),
-        "Chromium or the Python module playwright is not installed, and CI must have them"
-    );
-    if !there {
-        eprintln!("skipped: Chromium or the Python module playwright is not installed");
-    }
-    there.then_some(python)
-}
-
-fn runs(command: &mut Command) -> bool {
-    let status = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
-    status.is_ok_and(|status| status.success())
+    let chromium = peers::is_there(peers::runs("/usr/bin/chromium", &["--version"]), "Chromium");
+    peers::python_with("playwright, axe_playwright_python").filter(|_| chromium)
 }

@@ -24,6 +24,7 @@ use std::{
 };
 
 use drive_sparkplug::{Metric, Payload, Raw};
+use drive_testing::peers;
 use mosquitto::{Mosquitto, Tap};
 use recording::{Packet, Recording};
 use support::{File, Running, Sim, path};
@@ -350,14 +351,6 @@ fn a_host_that_was_not_written_here_reads_every_payload_asks_for_births_and_comm
 /// A Python with pysparkplug, or `None` with the reason printed. `DRIVED_SPARKPLUG_PYTHON` names the interpreter.
 fn python() -> Option<std::ffi::OsString> {
     let python = env::var_os("DRIVED_SPARKPLUG_PYTHON").unwrap_or_else(|| "python3".into());
-    let asked = Command::new(&python).args(["-c", "import pysparkplug"]).stderr(Stdio::null()).status();
-    let there = asked.is_ok_and(|status| status.success());
-    assert!(
-        there || env::var_os("CI").is_none(),
-        "the Python module pysparkplug is not installed, and CI must have it"
-    );
-    if !there {
-        eprintln!("skipped: the Python module pysparkplug is not installed");
-    }
-    there.then_some(python)
+    let found = peers::runs(&python, &["-c", "import pysparkplug"]);
+    peers::is_there(found, "the Python module pysparkplug").then_some(python)
 }

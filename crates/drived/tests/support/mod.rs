@@ -11,6 +11,8 @@ use std::{
     sync::atomic::{AtomicU32, Ordering},
 };
 
+use drive_testing::peers;
+
 /// The program with arguments, not yet started.
 pub(crate) fn drived(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_drived"));
@@ -97,19 +99,9 @@ pub(crate) fn free_port() -> u16 {
     TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).expect("there is one").port()
 }
 
-/// Whether a program that was not written here is there, by a run of it that ends well. Where it is not the reason is
-/// printed; where `CI` is set that fails, because `.ci/run` installs them all.
+/// Whether a program that was not written here is there, by a run of it that ends well: see [`drive_testing::peers`].
 pub(crate) fn is_there(program: &str, arguments: &[&str]) -> bool {
-    let mut command = Command::new(program);
-    let status =
-        command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
-    let found = status.is_ok_and(|status| status.success());
-    let what = format!("{program} {}", arguments.join(" "));
-    assert!(found || std::env::var_os("CI").is_none(), "{what} does not work, and CI must have it");
-    if !found {
-        eprintln!("skipped: {what} does not work");
-    }
-    found
+    peers::is_there(peers::runs(program, arguments), &format!("{program} {}", arguments.join(" ")))
 }
 
 /// A Python that has a module, or `None` with the reason printed. `DRIVED_PYTHON` names the interpreter.

@@ -38,8 +38,7 @@ impl Mosquitto {
         let child = match started {
             Ok(child) => child,
             Err(error) => {
-                assert!(std::env::var_os("CI").is_none(), "mosquitto cannot be started: {error}");
-                eprintln!("skipped: mosquitto cannot be started: {error}");
+                let _ = drive_testing::peers::is_there(false, &format!("mosquitto ({error})"));
                 return None;
             }
         };
