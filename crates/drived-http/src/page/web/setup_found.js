@@ -56,7 +56,11 @@ export function foundPanel(take) {
     const alike = one.families.map(({ family }) => family);
     const rest = families.filter(({ name }) => !alike.includes(name));
     const option = ({ name, title }) => el('option', { value: name, selected: name === first?.family }, `${name} – ${title}`);
-    const family = el('select', { 'aria-label': t('setup_family_of', { address }), disabled: !isDrive, onchange: () => (box.checked = family.value !== '') },
+    const choose = () => {
+      box.checked = family.value !== '';
+      write();
+    };
+    const family = el('select', { 'aria-label': t('setup_family_of', { address }), disabled: !isDrive, onchange: choose },
       first ? null : el('option', { value: '' }, t('setup_choose')),
       ...families.filter(({ name }) => alike.includes(name)).map(option), ...rest.map(option));
     const name = el('input', { type: 'text', value: t('setup_usual_name', { address }), 'aria-label': t('setup_name_of', { address }), disabled: !isDrive, autocomplete: 'off' });
