@@ -65,90 +65,50 @@ struct Truth {
     tripped: bool,
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_v20() {
-    life(kind("v20", "v20.py")).await;
+/// All of them, each with a profile that is shipped.
+fn kinds() -> Vec<Kind> {
+    vec![
+        kind("v20", "v20.py"),
+        kind("wj200", "wj200.py"),
+        kind("mx2", "wj200.py"),
+        Kind { arguments: &["102"], ..kind("danfoss-fc", "danfoss.py") },
+        Kind { arguments: &["51"], ..kind("danfoss-fc51", "danfoss.py") },
+        kind("goodrive", "goodrive.py"),
+        // Forward run, A. p. 786; 30 Hz.
+        Kind { others: &[(0x2001, 3_000), (0x2000, 0x12)], trip: 1, ..kind("ms300", "ms300.py") },
+        Kind { arguments: &["s15"], ..kind("vfs15", "toshiba.py") },
+        Kind { arguments: &["320"], ..kind("altivar", "altivar.py") },
+        // Printed 0004, write enable: 0 at power-up.
+        Kind { enables: &[(3, 1)], trip: 1, ..kind("ig5a", "ig5a.py") },
+        // Its works setting trips it within 100 ms of silence.
+        Kind { arguments: &["--set", "p2040=0"], ..kind("g120", "g120.py") },
+        // 0002h in 0.01 Hz, 0001h bit 0 runs forward: SIEPC71061627 p. 559.
+        Kind { others: &[(2, 3_000), (1, 1)], ..kind("a1000", "yaskawa.py") },
+        // The ABB Drives profile: 0406h, 0407h, 046Fh; REF1 of 20000 is 100 %.
+        Kind {
+            arguments: &["550"],
+            others: &[(0, 0x0406), (1, 12_000), (0, 0x0407), (0, 0x046F)],
+            trip: 1,
+            ..kind("acs550", "abb.py")
+        },
+    ]
 }
 
+/// All at once: most of a life is waiting for a motor.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_wj200() {
-    life(kind("wj200", "wj200.py")).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn an_mx2() {
-    life(kind("mx2", "wj200.py")).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_danfoss_fc_102() {
-    life(Kind { arguments: &["102"], ..kind("danfoss-fc", "danfoss.py") }).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_danfoss_fc_51() {
-    life(Kind { arguments: &["51"], ..kind("danfoss-fc51", "danfoss.py") }).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_goodrive() {
-    life(kind("goodrive", "goodrive.py")).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn an_ms300() {
-    // Forward run, A. p. 786; 30 Hz.
-    life(Kind { others: &[(0x2001, 3_000), (0x2000, 0x12)], trip: 1, ..kind("ms300", "ms300.py") }).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_vf_s15() {
-    life(Kind { arguments: &["s15"], ..kind("vfs15", "toshiba.py") }).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn an_altivar_320() {
-    life(Kind { arguments: &["320"], ..kind("altivar", "altivar.py") }).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn an_ig5a() {
-    // Printed 0004, write enable: 0 at power-up.
-    life(Kind { enables: &[(3, 1)], trip: 1, ..kind("ig5a", "ig5a.py") }).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_g120() {
-    // Its works setting trips it within 100 ms of silence. 40101 of 4000h is 100 %; 047Eh, then 047Fh at 40100.
-    life(Kind {
-        arguments: &["--set", "p2040=0"],
-        others: &[(100, 0x2666), (99, 0x047E), (99, 0x047F)],
-        ..kind("g120", "g120.py")
-    })
-    .await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn an_a1000() {
-    // 0002h in 0.01 Hz, 0001h bit 0 runs forward: SIEPC71061627 p. 559.
-    life(Kind { others: &[(2, 3_000), (1, 1)], ..kind("a1000", "yaskawa.py") }).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn an_acs550() {
-    // The ABB Drives profile: 0406h, 0407h, 046Fh; REF1 of 20000 is 100 %.
-    life(Kind {
-        arguments: &["550"],
-        others: &[(0, 0x0406), (1, 12_000), (0, 0x0407), (0, 0x046F)],
-        trip: 1,
-        ..kind("acs550", "abb.py")
-    })
-    .await;
+async fn what_is_said_of_a_drive_of_another_hand_is_what_its_shaft_does() {
+    let Some(python) = peers::python_with("pymodbus") else { return };
+    let mut lives = tokio::task::JoinSet::new();
+    for kind in kinds() {
+        lives.spawn(life(python.clone(), kind));
+    }
+    while let Some(lived) = lives.join_next().await {
+        lived.unwrap_or_else(|failed| std::panic::resume_unwind(failed.into_panic()));
+    }
 }
 
 /// The whole life of one.
-async fn life(kind: Kind) {
-    let Some(python) = peers::python_with("pymodbus") else { return };
+async fn life(python: std::path::PathBuf, kind: Kind) {
     let mut stage = Stage::begin(&python, kind).await;
     stage.enable().await;
     let level = shipped::find(stage.kind.key).expect("it is shipped").level();
@@ -238,7 +198,7 @@ impl Stage {
         self.write_as_another(self.kind.enables).await;
     }
 
-    async fn write_as_another(&self, words: &[(u16, u16)]) {
+    async fn write_as_another(&mut self, words: &[(u16, u16)]) {
         use tokio_modbus::client::Writer as _;
         let mut other = tokio_modbus::client::Context::from(self.line.slave(1));
         for &(register, word) in words {
