@@ -290,6 +290,12 @@ impl<T> Schedule<T> {
         if let Some(at) = held.min() {
             return Some(Best::At(at));
         }
+        // In front of what has aged, which has its turn behind it: the other way round the twentieth turn would be the twenty-first.
+        if self.since_background + 1 >= BACKGROUND_TURN
+            && let Some(background) = first(Class::Background)
+        {
+            return Some(background);
+        }
         if self.since_aged + 1 >= AGED_TURN
             && let Some((index, _)) = all()
                 .filter(|(_, (entry, readiness))| self.has_aged(now, entry) && readiness.at <= now)
@@ -298,11 +304,6 @@ impl<T> Schedule<T> {
                 })
         {
             return Some(Best::Now(index));
-        }
-        if self.since_background + 1 >= BACKGROUND_TURN
-            && let Some(background) = first(Class::Background)
-        {
-            return Some(background);
         }
         let best = all().filter(|(_, (_, readiness))| readiness.at <= now).min_by_key(|(_, (entry, _))| {
             let class = crate::mutant!(

@@ -225,6 +225,18 @@ fn a_full_queue_refuses_all_but_stops() {
     assert!(schedule.push(now, 3, Terms::of(Class::Stop), 4).is_ok());
 }
 
+#[test]
+fn background_has_its_twentieth_turn_also_while_something_has_aged() {
+    let (mut schedule, now) = (schedule(), Instant::now());
+    // Aged: an old status behind a stream of commands, at each of its turns.
+    (0..10).for_each(|work| push(&mut schedule, now, 2, Terms::of(Class::Status), work));
+    let later = now + 2_000 * MS;
+    (100..200).for_each(|work| push(&mut schedule, later, 1, Terms::of(Class::Command), work));
+    push(&mut schedule, later, 3, Terms::of(Class::Background), 99);
+    let order = order(&mut schedule, later);
+    assert!(order.iter().position(|work| *work == 99).unwrap() < 20, "{order:?}");
+}
+
 #[derive(Debug, Clone, Copy)]
 enum Event {
     Push { slave: u8, class: Class, lifetime: Option<u64>, key: Option<u16> },

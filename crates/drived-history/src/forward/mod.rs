@@ -34,13 +34,15 @@ const AGAIN_AT_MOST: Duration = Duration::from_secs(30);
 /// Sends on what is in the file, until it is dropped. It waits for the other side, and nobody waits for it.
 pub async fn run(path: PathBuf, forward: Forward, inbox: Inbox, health: watch::Sender<Option<String>>) {
     let mut place = None;
+    // A server that has taken nothing yet may refuse everything for how it was named: a database that is missing is 400 at some.
+    let mut has_taken = false;
     loop {
         match look(path.clone(), forward.target.to_string(), place.clone()).await {
             Ok(Some(part)) => {
                 if let Some(skipped) = part.skipped() {
                     tracing::warn!("{}: {skipped}", forward.target);
                 }
-                deliver(&forward, &part, &health).await;
+                has_taken |= deliver(&forward, &part, has_taken, &health).await;
                 let next = part.next;
                 if next.is_whole() {
                     inbox.sent(forward.target.to_string(), next.clone());
@@ -65,17 +67,24 @@ async fn look(path: PathBuf, target: String, place: Option<Place>) -> Result<Opt
     read.await.unwrap_or(Ok(None))
 }
 
-/// Sends a part again and again until it is taken, or refused for what is in it.
-async fn deliver(forward: &Forward, part: &Part, health: &watch::Sender<Option<String>>) {
+/// Sends a part again and again until it is taken, or refused for what is in it by a server that has taken others. Gives whether lines
+/// were taken.
+async fn deliver(
+    forward: &Forward,
+    part: &Part,
+    has_taken: bool,
+    health: &watch::Sender<Option<String>>,
+) -> bool {
     let mut wait = AGAIN;
     loop {
         let told = match part.lines.is_empty() {
             true => Ok(()),
             false => post(forward, part.lines.clone()).await,
         };
+        let is_taken = told.is_ok() && !part.lines.is_empty();
         let failing = match told {
             Ok(()) => None,
-            Err(error) if error.is_of_content => {
+            Err(error) if error.is_of_content && has_taken => {
                 tracing::error!("{} refuses a part of what it was sent: {error}", forward.target);
                 None
             }
@@ -87,7 +96,7 @@ async fn deliver(forward: &Forward, part: &Part, health: &watch::Sender<Option<S
             is_other
         });
         if failing.is_none() {
-            return;
+            return is_taken;
         }
         sleep(wait).await;
         wait = (wait * 2).min(AGAIN_AT_MOST);

@@ -22,7 +22,7 @@ pub struct Newest {
     pub frame: i64,
 }
 
-/// For how long daemons have run with a file, as far as it knows: the last hour before a kill is not counted.
+/// For how long daemons have run with a file, as far as it knows: the last ten minutes before a kill are not counted.
 ///
 /// # Errors
 /// It cannot be read.
@@ -51,8 +51,8 @@ pub fn mark(connection: &Connection, now: Lived, every_ms: i64) -> rusqlite::Res
     Ok(true)
 }
 
-/// How often it is marked.
-pub const MARKED_EVERY_MS: i64 = HOUR_MS;
+/// How often it is marked: a plant that is switched off at the mains after each shift grows older too.
+pub const MARKED_EVERY_MS: i64 = HOUR_MS / 6;
 
 /// What was the newest when the file was younger by `age_ms`; `None`: it was not there then.
 ///

@@ -217,6 +217,16 @@ pub fn trim(connection: &mut Connection, now: Lived, limits: &Limits) -> Result<
 
 /// What is finest goes first: an hour of ten years ago tells more than a second of yesterday.
 fn trim_largest(connection: &Connection) -> Result<usize, StoreError> {
+    let gone = connection.execute(
+        &format!(
+            "DELETE FROM line_minute WHERE (wall_ms, line) IN
+                (SELECT wall_ms, line FROM line_minute ORDER BY wall_ms, line LIMIT {AT_ONCE})"
+        ),
+        [],
+    )?;
+    if gone > 0 {
+        return Ok(gone);
+    }
     for table in ["block", "minute"] {
         let gone = trim_table(connection, table, i64::MAX)?;
         if gone > 0 {
