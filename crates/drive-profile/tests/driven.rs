@@ -482,3 +482,73 @@ async fn an_exception_to_a_run_command_is_no_proof_that_nothing_was_done() {
     assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
     assert!(rig.drive.lease().is_some());
 }
+
+/// A drive whose guard reads otherwise once it has tripped, as a bit does that tells who commands just now.
+fn guarded() -> Rig {
+    let text = text("invt/goodrive").replace("is = [1, 2, 3, 4, 5, 6]", "is = [1, 2, 3, 5, 6]");
+    let family = family_of(read(&text).expect("it is right"));
+    contract(family, family.simulated_options()).rig()
+}
+
+/// The stop word of a Goodrive: 5 in 2000h.
+fn stops(rig: &Rig) -> usize {
+    let stop = [0x06, 0x20, 0x00, 0x00, 0x05];
+    rig.machine.received().iter().filter(|request| request.pdu[..] == stop).count()
+}
+
+/// The run word may stand in the drive, and act when the place of control comes back: a stop is withheld only from a drive in which this
+/// side has run nothing.
+#[tokio::test(start_paused = true)]
+async fn a_stop_and_a_withdrawal_go_to_a_drive_that_was_run_from_here_whatever_its_guards_read_since() {
+    for (withdraws, adopts) in [(false, false), (true, false), (false, true), (true, true)] {
+        let mut rig = guarded();
+        if adopts {
+            rig.drive.adopt(drive_core::Lease::new(Direction::Forward, 1));
+        } else {
+            rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+            rig.drive.start(Direction::Forward).await.expect("it starts");
+        }
+        rig.machine.trip(9);
+        rig.drive.forget();
+        rig.drive.status().await.expect("it is read all the same");
+        let identity = drive_core::Identity::default();
+        assert_eq!(rig.drive.recognise(&identity), drive_core::Recognised::CannotTell);
+        let refused = rig.drive.start(Direction::Forward).await.expect_err("nothing but a stop");
+        assert_eq!((refused.kind(), stops(&rig)), (ErrorKind::Refused, 0), "{refused}");
+        if withdraws {
+            rig.drive.withdraw().await.expect("it takes it");
+        } else {
+            rig.drive.stop(StopMode::Ramp).await.expect("it takes it");
+        }
+        assert!(stops(&rig) >= 1 && rig.drive.lease().is_none(), "{withdraws} {adopts}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_is_withheld_says_that_nothing_was_sent_what_was_read_and_what_was_wanted() {
+    let mut rig = guarded();
+    rig.machine.trip(9);
+    rig.drive.status().await.expect("it is read all the same");
+    let error = rig.drive.stop(StopMode::Ramp).await.expect_err("it is another drive, for all that is known");
+    assert_eq!((error.kind(), stops(&rig)), (ErrorKind::Refused, 0), "{error}");
+    let told = error.to_string();
+    assert!(told.contains("reads 0004h") && told.contains("not 0001h or 0002h"), "{told}");
+}
+
+/// Once the guards have held, a mode may be a run command where they read otherwise now: 7 in the I/O profile of an Altivar.
+#[tokio::test(start_paused = true)]
+async fn a_stop_of_a_drive_that_is_set_up_otherwise_by_now_is_the_one_that_is_a_stop_in_any_case() {
+    let text = text("invt/goodrive")
+        .replace("is = [1, 2, 3, 4, 5, 6]", "is = [1, 2, 3, 5, 6]")
+        .replace("unread = \"ramp\"", "unread = \"freewheel\"");
+    let family = family_of(read(&text).expect("it is right"));
+    let mut rig = contract(family, family.simulated_options()).rig();
+    rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.machine.trip(9);
+    rig.drive.forget();
+    rig.drive.status().await.expect("it is read all the same");
+    let stopped = rig.drive.stop(StopMode::Ramp).await.expect("it takes it");
+    assert_eq!((stopped.mode, stops(&rig)), (StopMode::Freewheel, 0));
+    assert!(stopped.instead.is_some());
+}

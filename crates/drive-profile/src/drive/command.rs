@@ -79,6 +79,7 @@ impl<P: Port> ProfileDrive<P> {
         }
         let word = profile.file().run_word(action, self.kept).unwrap_or(0);
         self.watch.run.give(Lease::new(direction, word));
+        let was_started = std::mem::replace(&mut self.guarded.started, true);
         self.comes_down = None;
         let sent = self.step(last.get_ref(), Class::Command, order).await;
         self.registers.owe_judgement();
@@ -86,6 +87,7 @@ impl<P: Port> ProfileDrive<P> {
             Ok(()) => self.watch.run.was_written(),
             Err(error) if error.kind() == ErrorKind::NotSent => {
                 self.watch.run.was_not_written();
+                self.guarded.started = was_started;
                 return Err(if is_begun { error.after_write() } else { error });
             }
             // An exception is no proof that nothing was done.
@@ -159,7 +161,8 @@ impl<P: Port> ProfileDrive<P> {
     /// The stop is written before anything is read, and again while it does not show.
     pub(super) async fn stop_motor(&mut self, asked: StopMode) -> Result<Stopped> {
         self.allow(Level::Stop, "a stop")?;
-        if let Some(barred) = self.stop_is_barred() {
+        let order = Order::Stop(asked);
+        if let Some(barred) = self.stop_is_barred(order) {
             return Err(barred);
         }
         let profile = self.profile.clone();
@@ -169,7 +172,6 @@ impl<P: Port> ProfileDrive<P> {
         else {
             return Err(Error::Unsupported { what: "a stop", reason: "its profile has none" });
         };
-        let order = Order::Stop(asked);
         // What the drive shows is no proof of a stop that it has refused or never got: behind a trip, or a state in which no motor turns,
         // the run command may stand and act when that goes away.
         let mut written = self.write_stop(action, order).await?;
@@ -222,9 +224,15 @@ impl<P: Port> ProfileDrive<P> {
     /// The mode by which a stop is done, and why where it is not the one that was asked for.
     fn substitute(&self, profile: &Profile, asked: StopMode) -> (StopMode, Option<&'static str>) {
         let unread = stop_mode(*profile.file().stop.unread.get_ref());
-        if !self.guarded.have_held {
-            let why = "what tells how the drive is set up was never read: this one is a stop whatever it is";
-            return (unread, (asked != unread).then_some(why));
+        let why = if self.guarded.otherwise.is_some() && !self.guarded.hold {
+            Some("the drive is set up otherwise than its profile says: this one is a stop whatever it is")
+        } else if self.guarded.have_held {
+            None
+        } else {
+            Some("what tells how the drive is set up was never read: this one is a stop whatever it is")
+        };
+        if why.is_some() {
+            return (unread, why.filter(|_| asked != unread));
         }
         let has = profile.stop_modes();
         if has.contains(&asked) {
@@ -250,14 +258,13 @@ impl<P: Port> ProfileDrive<P> {
         if self.watch.run.lease().is_none() {
             return Ok(Withdrawn::Nothing(Status { verdict: None, ..status }));
         }
-        self.guard(Order::Withdraw).await?;
+        // Whatever they say, and also where they cannot be read: a run command of this side may stand, and act once it can.
+        self.see_guards(Class::Command).await.ok();
         let profile = self.profile.clone();
-        let Some(step) = profile.file().stop.ramp.given().and_then(|stop| stop.get_ref().steps.first())
-        else {
-            return Err(Error::Unsupported {
-                what: "a withdrawal",
-                reason: "its profile has no stop along the ramp",
-            });
+        let (mode, _) = self.substitute(&profile, StopMode::Ramp);
+        let stop = profile.file().stop.of(mode_name(mode)).given();
+        let Some(step) = stop.and_then(|stop| stop.get_ref().steps.first()) else {
+            return Err(Error::Unsupported { what: "a withdrawal", reason: "its profile has no stop" });
         };
         self.step(step.get_ref(), Class::Command, Order::Withdraw).await?;
         self.registers.owe_judgement();

@@ -30,7 +30,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
     }
 
     fn recognise(&self, _: &drive_core::Identity) -> Recognised {
-        match self.guarded.otherwise.filter(|_| !self.guarded.hold) {
+        match self.is_another() {
             Some(it_is) => Recognised::NotMine { it_is },
             // Another maker's drive may read so too: it is likely, and no more.
             None => Recognised::CannotTell,

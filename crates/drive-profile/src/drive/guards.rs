@@ -14,13 +14,15 @@ pub(super) struct Guarded {
     pub(super) have_held: bool,
     /// What was found otherwise at the last reading.
     pub(super) otherwise: Option<&'static str>,
+    /// A run command of this side went out where they held: it may stand in the drive, whatever is read there since.
+    pub(super) started: bool,
 }
 
 impl Guarded {
     /// A drive without guards has nothing to show.
     pub(super) fn of(profile: &Profile) -> Self {
         let none = all(profile).next().is_none();
-        Self { hold: none, have_held: none, otherwise: None }
+        Self { hold: none, have_held: none, otherwise: None, started: false }
     }
 
     /// The line was lost: the drive may be another one.
@@ -39,6 +41,23 @@ fn holds(guard: &Guard, word: u16) -> bool {
     let word = word & guard.mask.unwrap_or(u16::MAX);
     guard.is.as_ref().is_none_or(|is| is.contains(&word))
         && guard.is_not.as_ref().is_none_or(|is_not| !is_not.contains(&word))
+}
+
+/// What does not hold, with what was read and what was wanted.
+fn is_otherwise(guard: &Guard, read: Option<u16>) -> String {
+    let words = |all: &[u16]| all.iter().map(|word| format!("{word:04X}h")).collect::<Vec<_>>().join(" or ");
+    let wanted = match (&guard.is, &guard.is_not) {
+        (Some(is), _) => format!("not {}", words(is)),
+        (None, is_not) => format!("may not be {}", words(is_not.as_deref().unwrap_or_default())),
+    };
+    let mask = guard.mask.unwrap_or(u16::MAX);
+    let masked = if mask == u16::MAX { String::new() } else { format!(" & {mask:04X}h") };
+    let read = read.map_or_else(|| "was not read".to_owned(), |word| format!("reads {:04X}h", word & mask));
+    format!(
+        "none of which this holds: {} ({}{masked} {read}, and {wanted})",
+        guard.what,
+        guard.register.get_ref()
+    )
 }
 
 impl<P: Port> ProfileDrive<P> {
@@ -82,16 +101,10 @@ impl<P: Port> ProfileDrive<P> {
             let read = self.read_block(class, block).await?;
             words.keep(block, read);
         }
-        let fails = |guard: &&Guard| {
-            profile.word(&words, guard.register.get_ref()).is_none_or(|word| !holds(guard, word))
-        };
-        self.guarded.otherwise = all(&profile).find(fails).map(|guard| {
-            interned::text(&format!(
-                "none of which this holds: {} ({})",
-                guard.what,
-                guard.register.get_ref()
-            ))
-        });
+        let read = |guard: &Guard| profile.word(&words, guard.register.get_ref());
+        let fails = |guard: &&Guard| read(guard).is_none_or(|word| !holds(guard, word));
+        self.guarded.otherwise =
+            all(&profile).find(fails).map(|guard| interned::text(&is_otherwise(guard, read(guard))));
         if self.guarded.otherwise.is_none() {
             (self.guarded.hold, self.guarded.have_held) = (true, true);
         }
@@ -107,10 +120,15 @@ impl<P: Port> ProfileDrive<P> {
         }
     }
 
-    /// A stop does not go to a drive that was found to be another one: its stop word may be that one's run word.
-    pub(super) fn stop_is_barred(&self) -> Option<Error> {
-        let what = self.guarded.otherwise.filter(|_| !self.guarded.hold)?;
-        let command = Command::Stop(drive_core::StopMode::Ramp);
-        Some(self.not_confirmed(command, drive_core::Status::default(), Some(Refusal::AnotherDrive(what))))
+    /// What was found otherwise, of a drive that no run command of this side ever went to: it is another one. Once one did, it may stand
+    /// there, and act when whatever is otherwise is as before again: a stop and a withdrawal go out, whatever is read.
+    pub(super) fn is_another(&self) -> Option<&'static str> {
+        let is_ours = self.guarded.started || self.watch.run.lease().is_some();
+        self.guarded.otherwise.filter(|_| !self.guarded.hold && !is_ours)
+    }
+
+    /// A stop does not go to a drive that was found to be another one: its stop word may be that one's run word. Nothing was sent.
+    pub(super) fn stop_is_barred(&self, command: Command) -> Option<Error> {
+        self.is_another().map(|what| self.refused(command, Refusal::AnotherDrive(what)))
     }
 }
