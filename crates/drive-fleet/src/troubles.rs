@@ -32,8 +32,12 @@ impl Snapshot {
         let (since, detail) = match kind {
             ConcernKind::StopUnconfirmed => {
                 let stop = self.stop.filter(|stop| stop.alarm)?;
-                let tries = if stop.attempts == 1 { "time" } else { "times" };
-                (Some(stop.since), Some(format!("{} stop, sent {} {tries}", stop.mode, stop.attempts)))
+                let sent = match stop.attempts {
+                    0 => "not sent".to_owned(),
+                    1 => "sent 1 time".to_owned(),
+                    times => format!("sent {times} times"),
+                };
+                (Some(stop.since), Some(format!("{} stop, {sent}", stop.mode)))
             }
             ConcernKind::RunCommandStands => (None, Some(self.run_command_stands.as_ref()?.to_string())),
             ConcernKind::LostRunning => (heard, (self.link == Link::Lost && was_moving).then(error)?),

@@ -173,7 +173,7 @@ impl Commanded {
                 _ = seconds.tick(), if !taken => {
                     waited += 1;
                     let sent = match self.handle.snapshot().stop.map_or(0, |stop| stop.attempts) {
-                        0 => "no attempt has ended yet".to_owned(),
+                        0 => "not sent yet".to_owned(),
                         1 => "sent 1 time".to_owned(),
                         times => format!("sent {times} times"),
                     };

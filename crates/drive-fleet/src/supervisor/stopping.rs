@@ -25,6 +25,11 @@ const PROGRESS: Frequency = Frequency::from_centihertz(50);
 /// Longer than any exit: its own limit ends it.
 const EXIT: Duration = Duration::from_secs(86_400);
 
+/// Whether its driver does not send it at all.
+const fn is_refused(error: &Error) -> bool {
+    matches!(error.kind(), ErrorKind::Refused | ErrorKind::Unsupported)
+}
+
 /// A stop under way.
 #[derive(Debug)]
 pub(super) struct Stopping {
@@ -243,7 +248,9 @@ impl Supervisor {
         let standstill = self.settings.times.standstill;
         let Some(stopping) = &mut self.stopping else { return };
         // What never left for the line was no attempt.
-        let sent = result.as_ref().err().is_none_or(|error| error.kind() != ErrorKind::NotSent);
+        let error = result.as_ref().err();
+        let refused = error.is_some_and(is_refused);
+        let sent = !refused && error.is_none_or(|error| error.kind() != ErrorKind::NotSent);
         stopping.attempts = stopping.attempts.saturating_add(u32::from(sent));
         stopping.begun = stopping.begun.saturating_sub(u32::from(!sent));
         let cause = stopping.asker.cause();
@@ -282,6 +289,10 @@ impl Supervisor {
                 stopping.next_try = crate::mutant!("stop-not-repeated", Some(now + stopping.pause), None);
                 stopping.pause = (stopping.pause * 2).min(REPEAT.1);
                 stopping.taken = false;
+                // No time makes it go out: whoever looks after the motor is told now.
+                if refused {
+                    stopping.alarm_at = stopping.alarm_at.map(|at| at.min(now));
+                }
                 let status = status_of(&error);
                 stopping.error = Some(error);
                 status
@@ -416,6 +427,10 @@ impl Supervisor {
                     _ => None,
                 };
                 Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because, stop })
+            }
+            // It never left: by what its driver knows, it is no stop of this drive.
+            (_, Some(refused)) if stopping.attempts == 0 && is_refused(refused) => {
+                Outcome::NotConfirmed(Unconfirmed::Denied(refused.clone()))
             }
             // An exception is an answer: it was not carried out.
             (_, Some(denied)) if denied.kind() == ErrorKind::Exception => {

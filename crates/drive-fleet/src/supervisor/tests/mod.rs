@@ -62,6 +62,8 @@ struct Paper {
     refuses_stops: bool,
     /// No stop leaves for its line in time.
     expires_stops: bool,
+    /// Its driver sends no stop, because.
+    withholds_stops: Option<Refusal>,
     /// It takes every stop and goes on, because.
     denies_stops: Option<Refusal>,
     /// The run command of this side that it holds.
@@ -116,6 +118,7 @@ impl Paper {
             refuses_watchdog: false,
             refuses_stops: false,
             expires_stops: false,
+            withholds_stops: None,
             denies_stops: None,
             lease: None,
             held: None,
@@ -191,6 +194,11 @@ impl Paper {
         let reached = self.failing.is_none();
         match job {
             Job::Stop(_) if self.expires_stops => Reply::Stopped(Err(port_error(PortError::Expired))),
+            Job::Stop(mode) if self.withholds_stops.is_some() => {
+                let (slave, command) = (slave(), Command::Stop(mode));
+                let reason = self.withholds_stops.expect("it was looked at");
+                Reply::Stopped(Err(Error::Refused { slave, command, reason }))
+            }
             Job::Stop(_) if self.refuses_stops => Reply::Stopped(Err(not_now(8501))),
             Job::Stop(mode) if self.denies_stops.is_some() => {
                 let (slave, command, because) = (slave(), Command::Stop(mode), self.denies_stops);

@@ -45,6 +45,31 @@ fn a_stop_is_repeated_until_the_drive_shows_standstill() {
     assert_eq!(rig.snapshot().stop, None);
 }
 
+/// Whose guards say that it is another drive gets no stop: that is an alarm at once, and nothing that was sent.
+#[test]
+fn a_stop_that_its_driver_does_not_send_is_counted_as_none_and_an_alarm_at_once() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.drive.withholds_stops = Some(Refusal::AnotherDrive("another"));
+    let id = rig.stop(StopMode::Ramp);
+    rig.pass(100 * MS);
+    let stop = rig.snapshot().stop.expect("it goes on");
+    assert!(rig.events().contains(&"stop unconfirmed") && stop.alarm, "{stop:?}");
+    assert_eq!((stop.attempts, stop.taken), (0, false));
+    let concern = rig.snapshot().concern(rig.now).expect("it is one").to_string();
+    assert!(concern.contains("not sent") && !concern.contains("sent 0"), "{concern}");
+    rig.pass(10_000 * MS);
+    let outcome = rig.outcome(id).expect("it has ended");
+    assert!(
+        matches!(outcome, Outcome::NotConfirmed(Unconfirmed::Denied(Error::Refused { .. }))),
+        "{outcome}"
+    );
+    rig.drive.withholds_stops = None;
+    rig.pass(2_000 * MS);
+    assert!(rig.events().contains(&"stop confirmed"), "it is tried again all the while");
+}
+
 #[test]
 fn a_stop_that_the_drive_takes_back_is_sent_again() {
     let mut rig = Rig::ready();

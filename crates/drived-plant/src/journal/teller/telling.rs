@@ -56,10 +56,12 @@ impl Teller {
                 self.say(now, &drive, Level::INFO, "cleared", "shows no fault any more".to_owned());
             }
             What::StopUnconfirmed { since, attempts, outcome } => {
-                let text = format!(
-                    "STOP NOT CONFIRMED for {} after {attempts} attempts, the motor may turn: {outcome}",
-                    Span(since)
-                );
+                let sent = match attempts {
+                    0 => ", it was not sent".to_owned(),
+                    attempts => format!(" after {attempts} attempts"),
+                };
+                let text =
+                    format!("STOP NOT CONFIRMED for {}{sent}, the motor may turn: {outcome}", Span(since));
                 self.say(now, &drive, Level::ERROR, "stop", text);
             }
         }
