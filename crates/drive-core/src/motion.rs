@@ -72,6 +72,8 @@ pub enum Output {
     Cut,
     /// The output is cut by a trip.
     Tripped,
+    /// Something that watches the shaft itself says that it stands.
+    Stands,
     /// The words do not tell.
     NotKnown,
 }
@@ -257,6 +259,10 @@ impl Shaft {
                 self.descent.see(at, output.centihertz());
                 Motion::Braking
             }
+            Output::Stands if !turns => {
+                self.past = Past::AtRest;
+                Motion::AtRest
+            }
             Output::Injection if self.past == Past::AtRest => Motion::Held,
             Output::Injection => {
                 let since = *self.injected_since.get_or_insert(at);
@@ -266,12 +272,12 @@ impl Shaft {
                 (self.past, self.injected_since) = (Past::AtRest, None);
                 Motion::Held
             }
-            Output::None | Output::Gone | Output::Cut | Output::Tripped if turns => {
+            Output::None | Output::Gone | Output::Cut | Output::Tripped | Output::Stands if turns => {
                 // It tells an output all the same: it comes down.
                 self.past = Past::Braked { still: false };
                 Motion::Braking
             }
-            Output::None | Output::Gone | Output::Cut | Output::Tripped => {
+            Output::None | Output::Gone | Output::Cut | Output::Tripped | Output::Stands => {
                 self.without_output(at, shown == Output::Cut)
             }
         }
@@ -345,6 +351,16 @@ mod tests {
         shaft.see(now, Output::None, Some(Frequency::ZERO));
         shaft.stops();
         assert_eq!(shaft.see(now, Output::Cut, Some(Frequency::ZERO)), Motion::AtRest, "it stood");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn what_watches_the_shaft_ends_its_coasting_and_an_output_outweighs_it() {
+        let (mut shaft, now) = (Shaft::new(), Instant::now());
+        shaft.see(now, Output::Driven, FIFTY);
+        assert_eq!(shaft.see(now, Output::Cut, Some(Frequency::ZERO)), Motion::Coasting);
+        assert_eq!(shaft.see(now, Output::Stands, FIFTY), Motion::Braking, "it tells an output all the same");
+        assert_eq!(shaft.see(now, Output::Stands, Some(Frequency::ZERO)), Motion::AtRest);
+        assert_eq!(shaft.see(now, Output::Cut, Some(Frequency::ZERO)), Motion::AtRest);
     }
 
     #[tokio::test(start_paused = true)]

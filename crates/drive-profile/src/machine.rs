@@ -247,6 +247,9 @@ impl Machine {
         if let Some(at) = see.at_setpoint.given() {
             self.set(&mut words, at.get_ref(), self.ordered().is_some() && self.motor.is_at_target());
         }
+        if let Some(stands) = file.state.standstill.given() {
+            self.set(&mut words, stands.get_ref(), self.motor.shaft_frequency() == 0);
+        }
         for owner in
             [&file.ownership.command, &file.ownership.reference].into_iter().filter_map(|owner| owner.given())
         {

@@ -552,3 +552,41 @@ async fn a_stop_of_a_drive_that_is_set_up_otherwise_by_now_is_the_one_that_is_a_
     assert_eq!((stopped.mode, stops(&rig)), (StopMode::Freewheel, 0));
     assert!(stopped.instead.is_some());
 }
+
+/// A drive without supply, or just switched on, shows no output, and its shaft may turn all the same.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_turned_before_it_was_first_seen_is_not_told_at_rest() {
+    for cycles in [false, true] {
+        let mut rig = rig("v20");
+        for (register, word) in [(100, 8_192), (99, 0x047E), (99, 0x047F)] {
+            rig.machine.written_by_another(register, word).expect("it takes it");
+        }
+        tokio::time::sleep(Duration::from_secs(6)).await;
+        if cycles {
+            rig.machine.power_cycle();
+        } else {
+            rig.machine.motor_supply(false);
+        }
+        let status = rig.drive.status().await.expect("it answers");
+        assert!(rig.machine.observe().shaft_frequency > 2_000, "it turns");
+        assert!(!status.is_standstill() && status.output_frequency == Some(Frequency::ZERO), "{status}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_shaft_is_told_at_rest_by_what_its_file_names_for_that() {
+    let told = "standstill = { register = \"ZSW\", mask = 0x4000, value = 0x4000, source = \"oi2012 wb\" }";
+    for (standstill, end) in [("standstill = \"unknown\"", Motion::Coasting), (told, Motion::AtRest)] {
+        let text = text("siemens/v20").replace("standstill = \"unknown\"", standstill);
+        let family = family_of(read(&text).unwrap_or_else(|refusals| panic!("{refusals}")));
+        let mut rig = contract(family, family.simulated_options()).rig();
+        assert_eq!(rig.drive.status().await.expect("it answers").motion, end, "it was never seen to turn");
+        rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+        rig.drive.start(Direction::Forward).await.expect("it starts");
+        rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == 3_000).await;
+        rig.drive.stop(StopMode::Freewheel).await.expect("it stops");
+        assert_eq!(rig.drive.status().await.expect("it answers").motion, Motion::Coasting);
+        let status = rig.until_machine("it stands", |machine| machine.shaft_frequency == 0).await;
+        assert_eq!(status.motion, end);
+    }
+}

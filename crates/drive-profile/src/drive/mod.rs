@@ -55,7 +55,10 @@ impl<P: Port> ProfileDrive<P> {
         let registers = Registers::new(port, slave, profile.capabilities(), meaning);
         let (fast, slow, code) = (profile.fast(), profile.slow(), profile.code());
         let guarded = Guarded::of(&profile);
-        let watch = Watch::default();
+        let mut watch = Watch::default();
+        // What the motor did before it was first seen nobody knows: an output that is cut then is no standstill, for many a drive shows
+        // none while it has no supply, and behind a power cycle.
+        watch.shaft.stops();
         Self {
             registers,
             profile,

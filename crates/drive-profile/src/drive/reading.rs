@@ -75,7 +75,7 @@ impl<P: Port> ProfileDrive<P> {
                 status.raw = self.raw(&words);
             }
         }
-        let shown = self.shown(&status);
+        let shown = self.shown(&status, &words);
         status.motion = self.watch.see(Instant::now(), shown, status.output_frequency);
         let evidence = self.evidence(&status, &words);
         status.verdict = self.watch.run.verdict(&evidence);
@@ -228,10 +228,13 @@ impl<P: Port> ProfileDrive<P> {
             .collect()
     }
 
-    /// What this status shows of the output.
-    fn shown(&self, status: &Status) -> Output {
+    /// What this status shows of the output. Of the shaft it tells only by what its file names for that.
+    fn shown(&self, status: &Status, words: &Words) -> Output {
         let output = status.output_frequency;
+        let standstill = self.profile.file().state.standstill.given();
+        let stands = standstill.and_then(|bits| self.profile.fits(words, bits.get_ref())) == Some(true);
         match status.state {
+            State::Fault | State::Ready | State::Disabled | State::NotReady if stands => Output::Stands,
             State::Fault => Output::Tripped,
             State::Running => Output::Driven,
             State::Stopping | State::QuickStop | State::FaultReaction => match output {

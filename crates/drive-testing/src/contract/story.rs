@@ -35,7 +35,8 @@ impl Contract {
 
 async fn nothing_moves_at_first(rig: &mut Rig) {
     let status = rig.drive.status().await.expect("it answers");
-    assert!(status.is_standstill(), "{status}");
+    // Of a motor that was not seen before, not every drive tells whether it coasts.
+    assert!(status.is_undriven(), "{status}");
     rig.drive.measurements().await.expect("it measures");
     assert_eq!(rig.drive.faults().await.expect("it tells its faults").present, []);
     assert!(!rig.machine.observe().running, "reading moves nothing");
