@@ -5,12 +5,20 @@ use std::fmt;
 use crate::format::Spanned;
 
 use crate::{
-    format::{Action, Answer, File, Proves, Register, Space, StateName, Storage},
+    drive::hundredths,
+    format::{Action, Answer, File, Proves, Setpoint, Space, StateIs, StateName, Storage, UnitName},
     source::{grade, line},
 };
 
 /// Registers of commands that several makers have, each with words of its own: what stops one maker's drive runs another's.
 const SHARED: &[u16] = &[0x1000, 0x2000];
+
+/// The highest setpoint that is no slip of a scale: faster than any spindle that these drives turn, and more than any full scale allows.
+const HIGHEST_HERTZ: i64 = 1_000;
+const HIGHEST_PERCENT: i64 = 400;
+
+/// Of so many bits each combination is looked at.
+const FEW_BITS: u32 = 8;
 
 /// With what a drive can be trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -115,10 +123,64 @@ impl<'a> Ladder<'a> {
             self.sound(Level::Motion, &format!("state {:?}", is.get_ref().state), &bits.source);
             self.register(Level::Motion, bits.register.get_ref());
         }
+        let starts =
+            |is: &Spanned<StateIs>| matches!(is.get_ref().state, StateName::Ready | StateName::Disabled);
+        if !file.state.is.iter().any(starts) {
+            self.ask(
+                Level::Motion,
+                "is",
+                "nothing shows that it can be started: every start would be refused",
+                "which bits, or which number, show that it is ready?",
+            );
+        }
         self.seen();
         self.ownership();
         self.commands();
         self.who();
+    }
+
+    /// Words of its status that fit no state: all bits clear, as without supply, and what else a few bits can be.
+    fn uncovered(&mut self) {
+        let states = || self.file.state.is.iter().map(|is| is.get_ref().bits.get_ref());
+        let Some(first) = states().next() else { return };
+        let is_one = states().all(|bits| bits.register.get_ref() == first.register.get_ref());
+        let counted = states().fold(0, |all, bits| all | bits.mask.get_ref());
+        let all = if is_one && counted.count_ones() <= FEW_BITS { counted } else { 0 };
+        // From one part of the bits to the next, and through 0 to the end.
+        let parts = std::iter::successors(Some(0_u16), |part| {
+            Some((part | !all).wrapping_add(1) & all).filter(|next| *next != 0)
+        });
+        let none_fits = |word: &u16| !states().any(|bits| bits.fit(*word));
+        if let Some(word) = parts.into_iter().find(none_fits) {
+            self.say(
+                &format!("a status of {word:04X}h fits no state: it is told as not known, and not started from there"),
+                "what does the drive show without supply, and which state is that?",
+            );
+        }
+    }
+
+    /// How fast it would turn at the highest that its setpoint may be.
+    fn highest(&mut self, setpoint: &Spanned<Setpoint>) {
+        let fact = setpoint.get_ref();
+        let Some(register) = self.file.named(fact.register.get_ref()) else { return };
+        let Some([numerator, denominator]) = register.scale.as_ref().map(|scale| *scale.get_ref()) else {
+            return;
+        };
+        let most = match register.unit {
+            UnitName::Hertz => HIGHEST_HERTZ,
+            UnitName::Percent => HIGHEST_PERCENT,
+            _ => return,
+        };
+        let high = hundredths(fact.limits.get_ref().high.into(), numerator, denominator);
+        if high > most * 100 {
+            let (unit, limits) = (register.unit.symbol(), fact.limits.span().start);
+            self.keep(
+                Level::Motion,
+                limits,
+                &format!("its setpoint would go up to {}.{:02} {unit}", high / 100, high % 100),
+                "is the scale of its register right, and what is the highest that the manual allows?",
+            );
+        }
     }
 
     /// A way to see the setpoint or the output.
@@ -139,6 +201,7 @@ impl<'a> Ladder<'a> {
         match (&see.direction, &self.file.start.reverse) {
             (Answer::Given(direction), _) => {
                 self.sound(Level::Motion, "which way it turns", &direction.get_ref().source);
+                self.register(Level::Motion, direction.get_ref().register.get_ref());
             }
             (Answer::None, Answer::None) => {}
             (Answer::None | Answer::Unknown, _) => self.warn(
@@ -156,6 +219,7 @@ impl<'a> Ladder<'a> {
             match answer {
                 Answer::Given(owner) => {
                     self.sound(Level::Motion, what, &owner.get_ref().bits.source);
+                    self.register(Level::Motion, owner.get_ref().bits.register.get_ref());
                     if owner.get_ref().proves == Proves::Nothing {
                         self.warn(
                             &format!("the drive tells {what} only where it is not the bus"),
@@ -251,6 +315,11 @@ impl<'a> Ladder<'a> {
             Some(setpoint) => {
                 self.sound(Level::Motion, "its setpoint", &setpoint.get_ref().source);
                 self.register(Level::Motion, setpoint.get_ref().register.get_ref());
+                let fact = setpoint.get_ref();
+                for name in [&fact.limits.get_ref().high_in, &fact.full_scale].into_iter().flatten() {
+                    self.register(Level::Motion, name.get_ref());
+                }
+                self.highest(setpoint);
             }
             None => {
                 self.ask(
@@ -306,6 +375,7 @@ impl<'a> Ladder<'a> {
     /// What keeps from nothing and is told all the same.
     fn said(&mut self) {
         let file = self.file;
+        self.uncovered();
         match &file.watchdog {
             Answer::Given(watchdog) => {
                 let watchdog = watchdog.get_ref();
@@ -371,9 +441,13 @@ impl<'a> Ladder<'a> {
     }
 
     fn register(&mut self, level: Level, name: &str) {
-        if let Some(register) = self.file.named(name) {
-            let Register { source, .. } = register;
-            self.sound(level, &format!("register {name}"), source);
+        let Some(register) = self.file.named(name) else { return };
+        self.sound(level, &format!("register {name}"), &register.source);
+        // What says how many decimals it has scales it as well. No register stands behind that one again.
+        let decimals =
+            register.decimals_in.as_ref().and_then(|of| Some((of.get_ref(), self.file.named(of.get_ref())?)));
+        if let Some((name, decimals)) = decimals {
+            self.sound(level, &format!("register {name}"), &decimals.source);
         }
     }
 

@@ -1,8 +1,10 @@
 //! Actions: a stop that is one write and runs nothing, a start that runs, a reset that does neither.
 
+use std::collections::BTreeMap;
+
 use crate::format::Spanned;
 
-use super::Check;
+use super::{Check, states::is_fault};
 use crate::{
     format::{Access, Action, File, Register, Sign, Space, Step, Storage},
     profile::Written,
@@ -31,6 +33,9 @@ impl Check<'_> {
                 self.mask(run.get_ref());
             }
         }
+        if self.is_inverted() {
+            return;
+        }
         for (name, action) in file.actions() {
             self.source(&action.get_ref().source);
             self.steps(name, action);
@@ -43,6 +48,7 @@ impl Check<'_> {
         if let Some(reset) = file.reset.given() {
             self.reset(reset);
         }
+        self.starts_differ();
         self.setup();
         self.by_setpoint();
         let unread = &file.stop.unread;
@@ -54,6 +60,28 @@ impl Check<'_> {
                 "unread = one of the stops above that is a stop whatever the guards say",
             );
         }
+    }
+
+    /// Run words that are those of the stops: the starts, stops and resets would all be refused for what [command] has wrong.
+    fn is_inverted(&mut self) -> bool {
+        let file = self.file;
+        let Some(command) = file.command.given() else { return false };
+        let runs = |action: &Spanned<Action>| {
+            file.writes(action.get_ref()).into_iter().any(|written| file.runs(written))
+        };
+        let of = |kind: &'static str| file.actions().filter(move |(name, _)| name.starts_with(kind));
+        let is_it = of("stop.").next().is_some()
+            && of("stop.").all(|(_, stop)| runs(stop))
+            && of("start.").next().is_some()
+            && !of("start.").any(|(_, start)| runs(start));
+        if is_it {
+            self.refuse(
+                &command.span(),
+                "by [command] the words of the stops run the motor, and those of the starts do not",
+                "the mask and the value of the words that run it",
+            );
+        }
+        is_it
     }
 
     fn steps(&mut self, name: &str, action: &Spanned<Action>) {
@@ -117,7 +145,9 @@ impl Check<'_> {
             |function| function == READ_WRITE && space == Space::HoldingRegister && self.tells_its_state();
         let can = |function| by.is_some_and(|by| by.contains(&function)) || both(function);
         let fits = |function| can(function) && self.has(function);
-        if !function.is_some_and(fits) || function == by.map(|[one, _]| one) && count != 1 {
+        // That no function writes its register at all is told of the register.
+        let is_written = by.is_some_and(|by| by.into_iter().any(|function| self.has(function)));
+        if is_written && !function.is_some_and(fits) || function == by.map(|[one, _]| one) && count != 1 {
             self.refuse(
                 &spanned.span(),
                 format!(
@@ -233,6 +263,13 @@ impl Check<'_> {
             );
         }
         let seen = action.get_ref().seen.iter().flat_map(crate::format::Spanned::get_ref);
+        if seen.clone().next().is_some() && seen.clone().all(|state| is_fault(*state)) {
+            self.refuse(
+                &action.span(),
+                format!("{name} is said to be done only once the drive has tripped"),
+                "the states in which the motor stands after it: seen = [\"ready\", \"fault\"]",
+            );
+        }
         if seen.clone().any(|state| *state == crate::format::StateName::Running) {
             self.refuse(
                 &action.span(),
@@ -283,6 +320,25 @@ impl Check<'_> {
                 &action.span(),
                 format!("{name} runs the motor before its last step"),
                 "what has to be written first, then the run command",
+            );
+        }
+    }
+
+    /// Two starts that leave the same words behind turn the motor the same way.
+    fn starts_differ(&mut self) {
+        let file = self.file;
+        let left = |start: &Spanned<Action>| {
+            let writes = file.writes(start.get_ref()).into_iter();
+            writes.map(|of| ((of.space, of.address), of.value)).collect::<BTreeMap<_, _>>()
+        };
+        let (Some(forward), Some(reverse)) = (file.start.forward.given(), file.start.reverse.given()) else {
+            return;
+        };
+        if left(forward) == left(reverse) {
+            self.refuse(
+                &reverse.span(),
+                "start.reverse writes what start.forward writes: it would turn the same way",
+                "the words that turn it the other way, or reverse = \"none\"",
             );
         }
     }
@@ -387,18 +443,30 @@ impl Check<'_> {
             let stops = file.actions().filter(|(name, _)| name.starts_with("stop."));
             stops.flat_map(|(_, stop)| file.writes(stop.get_ref())).any(|stop| stop == written)
         };
+        let mut all = file.actions().filter(|(name, _)| name.starts_with("stop."));
+        let wrong = all.any(|(_, stop)| file.writes(stop.get_ref()).into_iter().any(|of| file.runs(of)));
         match action.clears_itself {
             None => self.refuse(
                 &reset.span(),
                 "whether the reset clears itself is left in silence",
                 "clears_itself = true or false",
             ),
-            Some(false) if !last.is_some_and(stops) => self.refuse(
+            // A stop that runs the motor is told of the stop.
+            Some(false) if !last.is_some_and(stops) && !wrong => self.refuse(
                 &reset.span(),
                 "the reset is left standing: some drives reset again and again, or restart",
                 "a last step with the word of a stop",
             ),
             Some(_) => {}
+        }
+        // A reset begins and ends with a stop where the drive wants it so; what it does is the word that is none.
+        let writes = file.writes(action);
+        if !writes.is_empty() && writes.iter().all(|written| stops(*written)) {
+            self.refuse(
+                &reset.span(),
+                "the reset writes nothing but what a stop writes: that word stops, or it resets",
+                "the word that stops under [stop]; reset = \"none\" where that resets as well",
+            );
         }
     }
 }

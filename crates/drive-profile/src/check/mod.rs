@@ -123,6 +123,10 @@ impl<'a> Check<'a> {
         self.texts();
         self.sources();
         self.registers();
+        if file.register.values().any(|register| file.place(register.get_ref()).is_none()) {
+            // Whatever names such a register would be refused for that, and not for what it says.
+            return;
+        }
         self.who();
         self.states();
         self.actions();

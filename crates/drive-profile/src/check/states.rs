@@ -28,7 +28,7 @@ fn covers(first: &StateIs, second: &StateIs) -> bool {
         && first.bits.get_ref().mask.get_ref() & !second.bits.get_ref().mask.get_ref() == 0
 }
 
-const fn is_fault(state: StateName) -> bool {
+pub(super) const fn is_fault(state: StateName) -> bool {
     matches!(state, StateName::Fault | StateName::FaultReaction)
 }
 

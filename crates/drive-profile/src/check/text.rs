@@ -101,6 +101,44 @@ const KEYS: &[(&str, &str)] = &[
     ("why", "why = why it is never written"),
 ];
 
+/// Whether a message is about what a value is, and not about how it is written.
+fn of_a_value(message: &str) -> bool {
+    ["invalid type: ", "invalid value: ", "invalid length "].iter().any(|begin| message.starts_with(begin))
+}
+
+/// The parser's words for kinds of values, and what they are called.
+const KINDS: &[(&str, &str)] = &[
+    ("u16", "one number of 0 to 65535"),
+    ("u32", "one number from 0"),
+    ("u8", "one number of 0 to 255"),
+    ("i32", "one number"),
+    ("i64", "one number"),
+    ("a sequence", "a list [...]"),
+    ("sequence", "a list [...]"),
+    ("a map", "a table { ... }"),
+    ("map", "a table { ... }"),
+    ("a string", "a text in quotes"),
+    ("a boolean", "true or false"),
+];
+
+/// A value or what is wanted instead, by what it is called in a file.
+fn in_words(said: &str) -> String {
+    if let Some((_, known)) = KINDS.iter().find(|(kind, _)| *kind == said) {
+        return (*known).to_owned();
+    }
+    if said.starts_with("struct ") {
+        return "a table { ... }".to_owned();
+    }
+    let of = [
+        ("integer `", "the number `"),
+        ("string \"", "the text \""),
+        ("boolean `", "`"),
+        ("floating point `", "the number `"),
+    ];
+    let found = of.iter().find_map(|(begin, by)| said.strip_prefix(begin).map(|rest| format!("{by}{rest}")));
+    found.unwrap_or_else(|| said.to_owned())
+}
+
 /// What the parser says, in the words of whoever writes a profile.
 fn refusal(text: &str, error: &toml::de::Error) -> Refusal {
     let message = error.message();
@@ -122,9 +160,18 @@ fn refusal(text: &str, error: &toml::de::Error) -> Refusal {
     } else if let Some(word) = quoted("unknown variant ") {
         let instead = expected.unwrap_or_else(|| "one of the words of the format".to_owned());
         (format!("`{word}` is none of the words that may stand there"), instead)
+    } else if let Some((found, wanted)) =
+        message.split_once(", expected ").filter(|_| message.starts_with("invalid ") && of_a_value(message))
+    {
+        let found = found.split_once(": ").map_or(found, |(_, found)| found);
+        (
+            format!("{} does not belong there", in_words(found)),
+            in_words(wanted.lines().next().unwrap_or_default()),
+        )
     } else {
-        let instead = expected.unwrap_or_else(|| "what the format has in this place".to_owned());
-        (message.lines().collect::<Vec<_>>().join(" "), instead)
+        let said = message.lines().collect::<Vec<_>>().join(" ");
+        let write = "key = value or [table], as the lines around it; what only explains begins with #";
+        (format!("this is no line of TOML: {said}"), write.to_owned())
     };
     Refusal { line, reason, write }
 }

@@ -76,20 +76,35 @@ impl Check<'_> {
         let guard = spanned.get_ref();
         self.readable(&guard.register);
         self.source(&guard.source);
-        let outside = |words: &Option<Vec<u16>>| {
-            let mask = guard.mask.unwrap_or(u16::MAX);
-            words.iter().flatten().any(|word| word & !mask != 0)
-        };
-        let said = [&guard.is, &guard.is_not].into_iter().flatten().map(Vec::len).sum::<usize>();
-        if said == 0
-            || guard.is.is_some() == guard.is_not.is_some()
-            || outside(&guard.is)
-            || outside(&guard.is_not)
-        {
+        let owners = [&self.file.ownership.command, &self.file.ownership.reference];
+        let mut owned = owners.into_iter().filter_map(Answer::given).map(|owner| &owner.get_ref().bits);
+        let mask = guard.mask.unwrap_or(u16::MAX);
+        if owned.any(|bits| {
+            bits.register.get_ref() == guard.register.get_ref() && mask & bits.mask.get_ref() != 0
+        }) {
+            self.refuse(
+                &spanned.span(),
+                format!(
+                    "{} tells who commands just now, and a guard says what the drive is: once another commands, its stop would be \
+                     withheld",
+                    guard.register.get_ref()
+                ),
+                "nothing here, [ownership] says it; a guard is a setting, such as the parameter that gives the command to the bus",
+            );
+        }
+        let words = || [&guard.is, &guard.is_not].into_iter().flatten().flatten();
+        if words().next().is_none() || guard.is.is_some() == guard.is_not.is_some() {
             self.refuse(
                 &spanned.span(),
                 "it is not said what this register has to hold",
-                "is = [...] or is_not = [...], of the bits in its mask",
+                "is = [...] or is_not = [...], one of them",
+            );
+        }
+        if let Some(word) = words().find(|word| **word & !mask != 0) {
+            self.refuse(
+                &spanned.span(),
+                format!("{word:04X}h has bits that its mask {mask:04X}h has not: it never reads so"),
+                format!("{:04X}h, or a mask with these bits", word & mask),
             );
         }
     }
