@@ -5,8 +5,8 @@ use std::fmt;
 use crate::format::Spanned;
 
 use crate::{
-    drive::hundredths,
     format::{Action, Answer, File, Proves, Setpoint, Space, StateIs, StateName, Storage, UnitName},
+    scale::hundredths,
     source::{grade, line},
 };
 

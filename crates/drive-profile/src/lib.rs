@@ -27,6 +27,8 @@ mod ladder;
 #[cfg(feature = "sim")]
 pub mod machine;
 mod profile;
+mod requests;
+mod scale;
 pub mod shipped;
 mod source;
 

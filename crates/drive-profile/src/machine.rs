@@ -12,9 +12,10 @@ use drive_sim::{
 
 use self::bits::Places;
 use crate::{
-    drive::{Words, counts, hundredths},
+    drive::Words,
     format::{Access, Bits, Guard, Order, Register, Space, UnitName},
     profile::{Profile, Written},
+    scale::{counts, hundredths},
 };
 
 /// What 100 % is on a simulated drive that counts in percent: its owner is to say so.

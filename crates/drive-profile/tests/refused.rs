@@ -536,3 +536,162 @@ fn a_write_by_function_23_of_a_drive_that_has_nothing_to_read_along() {
             && read(&text).expect_err("nothing to read").to_string().contains("by a function")
     );
 }
+
+/// Whoever starts it in reverse would turn it forward.
+#[test]
+fn starts_of_both_directions_with_the_same_words() {
+    let forward = "reverse = { steps = [{ write = \"CMD\", words = [2] }]";
+    refused(GOODRIVE, forward, "reverse = { steps = [{ write = \"CMD\", words = [1] }]", "turn the same way");
+    let split = include_str!("data/split.toml");
+    let turned = split.replace(
+        "{ write = \"DIRECTION\", words = [1] }, { write = \"RUN\", words = [1] }",
+        "{ write = \"DIRECTION\", words = [0] }, { write = \"RUN\", words = [1] }",
+    );
+    assert!(read(split).is_ok() && turned != split);
+    assert!(read(&turned).expect_err("it turns the same way").to_string().contains("turn the same way"));
+}
+
+/// Simphoenix E500: 3 stops it, 20h resets a fault and stops nothing.
+#[test]
+fn a_stop_that_is_the_reset() {
+    let text = good(GOODRIVE);
+    let reset = text.lines().find(|line| line.starts_with("reset = ")).expect("it has one");
+    let stop = "ramp = { steps = [{ write = \"CMD\", words = [5] }]";
+    let both = text
+        .replace(reset, "reset = { steps = [{ write = \"CMD\", words = [7] }], clears_itself = true, source = \"manuals\" }")
+        .replace(stop, "ramp = { steps = [{ write = \"CMD\", words = [7] }]");
+    let told = read(&both).expect_err("it stops nothing").to_string();
+    assert!(told.contains("nothing but what a stop writes"), "{told}");
+}
+
+#[test]
+fn a_stop_that_only_a_trip_shows() {
+    refused(
+        GOODRIVE,
+        "words = [5] }], seen = [\"ready\", \"not_ready\", \"fault\"]",
+        "words = [5] }], seen = [\"fault\"]",
+        "only once the drive has tripped",
+    );
+}
+
+/// Vacon 20: bit 7 of 2102 says that the fieldbus commands. Once the panel does, a stop would be withheld.
+#[test]
+fn a_guard_on_bits_that_tell_who_commands_just_now() {
+    let guard = |mask: &str| {
+        format!(
+            "guards = [{{ what = \"the bus commands\", register = \"STATE2\", mask = {mask}, is = [0], source = \"manuals\" }}]"
+        )
+    };
+    refused(GOODRIVE, "guards = \"none\"", &guard("0x0020"), "tells who commands just now");
+    assert!(read(&damaged(GOODRIVE, "guards = \"none\"", &guard("0x0001"))).is_ok(), "another bit of it");
+}
+
+#[test]
+fn a_guard_that_never_reads_so() {
+    refused(
+        ALTIVAR,
+        "register = \"CHCF\", is_not = [3]",
+        "register = \"CHCF\", mask = 0x0001, is_not = [3]",
+        "0003h has bits that its mask 0001h has not",
+    );
+}
+
+/// Held below motion, and by what.
+#[track_caller]
+fn held(text: &str, because: &str) {
+    let profile = read(text).unwrap_or_else(|refusals| panic!("{refusals}"));
+    assert!(profile.level() < Level::Motion, "{because}");
+    let gap = profile.gaps().iter().find(|gap| gap.what.contains(because));
+    let gap = gap.unwrap_or_else(|| panic!("{because:?} is not among {:#?}", profile.gaps()));
+    assert!(gap.keeps_from == Some(Level::Motion) && gap.line > 1, "{gap}");
+}
+
+#[test]
+fn what_scales_or_limits_a_setpoint_counts_with_its_source() {
+    let register = "\n[register.TOP]\nwhat = \"maximum\"\naddress = 40300\naccess = \"read\"\nunit = \"Hz\"\nscale = [1, 100]\nsource = \"memory\"\n\n[state]\n";
+    let memory = "[sources]\nmemory = { document = \"as remembered\", edition = \"unknown\", page = \"none\", mark = \"M\" }\n";
+    let base = good(V20).replace("\n[state]\n", register).replace("[sources]\n", memory);
+    assert_eq!(read(&base).expect("nothing rests on it").level(), Level::Motion);
+    held(&base.replace("full_scale = \"owner\"", "full_scale = \"TOP\""), "register TOP");
+    let base = base.replace(
+        "unit = \"Hz\"\nscale = [1, 100]\nsource = \"memory\"",
+        "unit = \"%\"\nscale = [1, 100]\nsource = \"memory\"",
+    );
+    held(&base.replace("high = 16384 }", "high = 16384, high_in = \"TOP\" }"), "register TOP");
+}
+
+/// Of a Simphoenix E500 0.1 Hz are one count, and 65535 of them 6553.5 Hz.
+#[test]
+fn a_setpoint_beyond_any_speed() {
+    let hertz = good(GOODRIVE);
+    assert_eq!(read(hertz).expect("it is right").level(), Level::Motion);
+    let (head, tail) = hertz.split_once("[register.FREQ]").expect("it has one");
+    let coarse = format!("{head}[register.FREQ]{}", tail.replacen("scale = [1, 100]", "scale = [1, 10]", 1));
+    held(&coarse, "up to 6553.50 Hz");
+    held(
+        &damaged(V20, "limits = { low = 0, high = 16384 }", "limits = { low = 0, high = 32767 }")
+            .replace("scale = [100, 16384]", "scale = [1000, 16384]"),
+        "up to 1999.94 %",
+    );
+}
+
+#[test]
+fn states_from_which_no_start_acts_and_words_that_fit_none() {
+    let ready = "    { state = \"ready\", bits = { register = \"STATE\", mask = 0xFFFF, value = 3, source = \"manuals\" } },\n";
+    held(&damaged(GOODRIVE, ready, ""), "every start would be refused");
+    let not_ready = "    { state = \"not_ready\", bits = { register = \"ZSW\", mask = 0x0001, value = 0x0000, source = \"oi2012 wb\" } },\n";
+    let told = |text: &str| {
+        let profile = read(text).unwrap_or_else(|refusals| panic!("{refusals}"));
+        profile.gaps().iter().any(|gap| gap.what.starts_with("a status of 0000h fits no state"))
+    };
+    assert!(!told(good(V20)) && told(&damaged(V20, not_ready, "")), "0 is what it shows without supply");
+}
+
+/// What is wrong first, and not what follows from it.
+#[test]
+fn the_first_message_is_the_cause() {
+    let first = |text: &str| read(text).expect_err("it is wrong").0.remove(0);
+    let text = good(V20).replace("numbering = \"from_40001\"", "numbering = \"from_one\"");
+    let line = |text: &str, place: &str| {
+        text.lines().position(|line| line.contains(place)).expect("it is there") + 1
+    };
+    let at = text.replace("address = 40110", "address = 0");
+    assert_eq!(first(&at).line, line(&at, "address = 0"), "{}", first(&at));
+    let runs = damaged(
+        V20,
+        "ramp = { steps = [{ write = \"STW\", words = [0x047E] }]",
+        "ramp = { steps = [{ write = \"STW\", words = [0x047F] }]",
+    );
+    let told = first(&runs);
+    assert!(told.line == line(&runs, "ramp = {") && told.reason.contains("run bit"), "{told}");
+    let turned =
+        [(1, 5), (2, 6), (3, 5), (4, 6)].iter().fold(good(GOODRIVE).to_owned(), |text, (run, stop)| {
+            let form = |value: i32| format!("register = \"CMD\", mask = 0xFFFF, value = {value},");
+            text.replace(&form(*run), &form(*stop))
+        });
+    let all = read(&turned).expect_err("it is turned round").0;
+    assert!(all.len() == 1 && all[0].reason.contains("by [command] the words of the stops"), "{all:#?}");
+}
+
+/// The parser's own words for kinds of values are none of a controls engineer's.
+#[test]
+fn what_is_no_value_is_told_in_the_words_of_a_file() {
+    for (place, by, wanted) in [
+        ("mask = 0x0008, value", "mask = \"eight\", value", "one number of 0 to 65535"),
+        ("mask = 0x0008, value", "mask = 70000, value", "one number of 0 to 65535"),
+        (
+            "scale = [1, 1]\nsigned = true\nsource = \"oi2012\"\n\n[register.CURRENT]",
+            "scale = 1\nsource = \"oi2012\"\n\n[register.CURRENT]",
+            "a list",
+        ),
+        ("sign_is_direction = false", "sign_is_direction = \"no\"", "true or false"),
+        ("format = 1", "format 1", "key = value"),
+    ] {
+        let told = read(&damaged(V20, place, by)).expect_err(by).0.remove(0);
+        let all = told.to_string();
+        assert!(
+            told.write.contains(wanted) && !all.contains("u16") && !all.contains("sequence"),
+            "{by}: {told}"
+        );
+    }
+}

@@ -2,6 +2,8 @@
 
 use std::{fs, path::PathBuf};
 
+use drive_bus::{exchange::rtu, pdu};
+use drive_core::tokio_modbus::Request;
 use drive_profile::{Level, Profile, Refusals};
 use serde_json::{Value, json};
 
@@ -45,6 +47,13 @@ fn tell(args: &Args, profile: &Profile) -> Result<(), Failure> {
     if profile.level() == Level::Motion {
         output::say("nothing keeps it from motion")?;
     }
+    let frames = frames(profile);
+    if !frames.is_empty() {
+        output::say("to hold against the manual, to address 1:")?;
+    }
+    for (name, sent) in frames {
+        output::say(format_args!("  {name}: {}", sent.join(", then ")))?;
+    }
     let (file, folder) = (args.file.display(), args.file.parent().filter(|of| !of.as_os_str().is_empty()));
     let folder = folder.map_or_else(|| ".".to_owned(), |folder| folder.display().to_string());
     output::say(format_args!("try it on its simulated twin: drived profile try {file} --sim"))?;
@@ -56,6 +65,16 @@ fn tell(args: &Args, profile: &Profile) -> Result<(), Failure> {
         output::say("not known, and told to whoever it matters to:")?;
     }
     said.iter().try_for_each(|gap| output::say(format_args!("  {}: {}", gap.what, gap.question)))
+}
+
+/// What its stops, starts and a setpoint are on the wire, in hexadecimal digits, as manuals print examples.
+fn frames(profile: &Profile) -> Vec<(String, Vec<String>)> {
+    let sent = |request: &Request<'static>| {
+        let pdu = pdu::encode(request).ok()?;
+        Some(rtu::frame(1, &pdu).iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" "))
+    };
+    let all = profile.requests().into_iter();
+    all.map(|(name, requests)| (name, requests.iter().filter_map(sent).collect())).collect()
 }
 
 fn tell_refusals(args: &Args, refusals: &Refusals) -> Result<(), Failure> {
@@ -85,6 +104,7 @@ pub(crate) fn object(profile: &Profile) -> Value {
         "name": profile.name(),
         "level": profile.level().to_string(),
         "sha256": profile.digest(),
+        "frames": frames(profile).into_iter().map(|(name, sent)| json!({ "what": name, "sent": sent })).collect::<Vec<_>>(),
         "gaps": gaps.collect::<Vec<_>>(),
     })
 }

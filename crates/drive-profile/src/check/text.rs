@@ -115,6 +115,7 @@ const KINDS: &[(&str, &str)] = &[
     ("i64", "one number"),
     ("a sequence", "a list [...]"),
     ("sequence", "a list [...]"),
+    ("an array of length 2", "a list of two numbers, such as [1, 100]"),
     ("a map", "a table { ... }"),
     ("map", "a table { ... }"),
     ("a string", "a text in quotes"),

@@ -1,7 +1,5 @@
 //! Start, stop, withdrawal and reset: what is written, step by step, and how it is seen.
 
-use std::borrow::Cow;
-
 use drive_core::{
     Class, Command as Order, Confirming, Control, Direction, Error, ErrorKind, Exchange, Frequency, Lease,
     Port, Refusal, Result, SETTLED_WITHIN, State, Status, StopMode, Stopped, Withdrawn,
@@ -18,6 +16,7 @@ use crate::{
     format::{Action, Deed, Step},
     ladder::Level,
     profile::{Profile, Written},
+    requests::READ_WRITE,
 };
 
 const NOT_OURS: Refusal = Refusal::Overridden {
@@ -36,9 +35,6 @@ const NO_SETPOINT: Refusal = Refusal::Settings(
 /// How far an output has to fall to be on its way down: more than the few counts by which that of many drives flickers. A ramp that
 /// falls less in the time that a command has to show (200 s from 50 Hz) is seen by its end, and not by its beginning.
 const FALL: Frequency = Frequency::from_centihertz(50);
-
-/// The function that writes registers and reads others in one exchange.
-const READ_WRITE: u8 = 23;
 
 /// The most rungs of a ladder that are climbed for one start.
 const RUNGS: usize = 8;
@@ -369,52 +365,39 @@ impl<P: Port> ProfileDrive<P> {
     }
 
     async fn write(&mut self, step: &Step, writes: &[Written], class: Class, order: Order) -> Result<()> {
-        let Some(&Written { space, address, value }) = writes.first() else { return Ok(()) };
+        let function = step.function.as_ref().map(|function| *function.get_ref());
+        let Some(request) = self.profile.request(function, writes) else { return Ok(()) };
         self.sends(writes);
         let is_edge = order == Order::ResetFaults;
         let mut calls = self.registers.at(class);
         if is_edge {
             calls = calls.edge();
         }
-        let by = step.function.as_ref().map(|function| *function.get_ref());
-        let several = writes.len() > 1 || by.is_some_and(|function| function >= 15);
-        if !space.is_bit() {
-            let words: Vec<u16> = writes.iter().map(|written| written.value).collect();
-            if let Some((function @ READ_WRITE, along)) = by.zip(self.profile.read_along()) {
-                let exchange = Exchange { function, register: Some(address) };
-                let request = Request::ReadWriteMultipleRegisters(along, 1, address, Cow::Borrowed(&words));
+        let by = |function, address| Exchange { function, register: Some(address) };
+        let (exchange, echo) = match &request {
+            Request::WriteSingleRegister(address, word) => return calls.write_word(*address, *word).await,
+            Request::WriteMultipleRegisters(first, words) => return calls.write_words(*first, words).await,
+            Request::ReadWriteMultipleRegisters(_, _, address, _) => {
+                let exchange = by(READ_WRITE, *address);
                 return match calls.request(request, exchange).await? {
                     Response::ReadWriteMultipleRegisters(read) if read.len() == 1 => Ok(()),
                     _ => Err(calls.answer(exchange, "the answer holds another number of registers")),
                 };
             }
-            return if several {
-                calls.write_words(address, &words).await
-            } else {
-                calls.write_word(address, value).await
-            };
-        }
-        let coils: Vec<bool> = writes.iter().map(|written| written.value != 0).collect();
-        let has = |function: &u8| calls_have(self.profile.file(), *function);
-        let several = several || !has(&5);
-        let exchange = Exchange { function: if several { 15 } else { 5 }, register: Some(address) };
-        let request = if several {
-            Request::WriteMultipleCoils(address, Cow::Borrowed(&coils))
-        } else {
-            Request::WriteSingleCoil(address, value != 0)
+            Request::WriteSingleCoil(address, on) => {
+                (by(5, *address), Response::WriteSingleCoil(*address, *on))
+            }
+            Request::WriteMultipleCoils(first, coils) => {
+                let count = u16::try_from(coils.len()).unwrap_or(u16::MAX);
+                (by(15, *first), Response::WriteMultipleCoils(*first, count))
+            }
+            _ => return Ok(()),
         };
         match calls.request(request, exchange).await? {
-            Response::WriteSingleCoil(at, on) if (at, on) == (address, value != 0) => Ok(()),
-            Response::WriteMultipleCoils(at, count) if at == address && usize::from(count) == coils.len() => {
-                Ok(())
-            }
+            response if response == echo => Ok(()),
             _ => Err(calls.answer(exchange, "the confirmation does not echo the write")),
         }
     }
-}
-
-fn calls_have(file: &crate::format::File, function: u8) -> bool {
-    file.link.get_ref().functions.iter().any(|has| *has.get_ref() == function)
 }
 
 const fn withheld_by(deed: Deed) -> Option<Refusal> {

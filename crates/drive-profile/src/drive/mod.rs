@@ -21,7 +21,7 @@ pub use owner::Owner;
 
 use crate::{ladder::Level, profile::Profile};
 use guards::Guarded;
-pub(crate) use plan::{Block, Words, counts, hundredths, is_double};
+pub(crate) use plan::{Block, Words, is_double};
 
 /// A drive of a profile behind a port. See [`Drive`](drive_core::Drive) for what its methods promise; what its profile does not let
 /// them do is `Unsupported`, and says why.

@@ -7,8 +7,11 @@ use drive_core::{
 };
 use tokio::time::Instant;
 
-use super::{ProfileDrive, Words, hundredths, plan::Block};
-use crate::format::{Answer, Owner as OwnerBits, Proves, Space, StateName, UnitName};
+use super::{ProfileDrive, Words, plan::Block};
+use crate::{
+    format::{Answer, Owner as OwnerBits, Proves, Space, StateName, UnitName},
+    scale::hundredths,
+};
 
 pub(super) const OTHERS: Refusal = Refusal::Overridden {
     by: "something else than the bus",

@@ -5,10 +5,11 @@ use drive_core::{
     Setpoint, SetpointProblem, Speed, State, Status, Verdict,
 };
 
-use super::{ProfileDrive, Words, counts, reading::OTHERS};
+use super::{ProfileDrive, Words, reading::OTHERS};
 use crate::{
     format::{Access, Register, Setpoint as Fact, Sign, UnitName},
     ladder::Level,
+    scale::{counts, hundredths},
 };
 
 const KEPT: Refusal = Refusal::Overridden {
@@ -226,7 +227,7 @@ impl<P: Port> ProfileDrive<P> {
         setpoint: Setpoint,
     ) -> SetpointProblem {
         let worth = |counts: i64| {
-            u32::try_from(super::hundredths(counts, numerator, denominator).max(0)).unwrap_or(u32::MAX)
+            u32::try_from(hundredths(counts, numerator, denominator).max(0)).unwrap_or(u32::MAX)
         };
         match setpoint {
             Setpoint::Frequency(_) => SetpointProblem::OutsideFrequencyLimits {
