@@ -30,6 +30,7 @@ fn time(text: &str) -> Option<Duration> {
     (100..=600_000).contains(&milliseconds).then(|| Duration::from_millis(milliseconds))
 }
 
+/// The last of them is an option of a drive whose watchdog any request feeds.
 static OPTIONS: [OptionEntry; 4] = [
     OptionEntry::new(
         FULL_SCALE,
@@ -52,7 +53,7 @@ static OPTIONS: [OptionEntry; 4] = [
     OptionEntry::new(
         WATCHDOG_TIME,
         "a time, such as 2s or 500ms",
-        "the time of its communication watchdog, as it is set at the drive: it is fed then, where a command word alone feeds it too",
+        "the time of its communication watchdog, as it is set at the drive: it is asked often enough then",
         &|text| time(text).is_some(),
     ),
 ];
@@ -79,8 +80,10 @@ pub fn definition(profile: &Arc<Profile>) -> &'static Definition {
     let of = profile.clone();
     let bits = Box::leak(Box::new(move |register| bits(&of, register)));
     let not_known: Vec<&'static str> = profile.not_known().map(drive_core::interned::text).collect();
+    let [first @ .., _] = &OPTIONS;
+    let options: &[OptionEntry] = if profile.is_fed_by_any_request() { &OPTIONS } else { first };
     let mut definition = Definition::new(profile.capabilities(), open)
-        .with_options(&OPTIONS)
+        .with_options(options)
         .with_bits(bits)
         .with_revision(drive_core::interned::text(profile.digest()))
         .with_not_known(drive_core::interned::list(&not_known));

@@ -5,7 +5,7 @@ use std::fmt;
 use crate::format::Spanned;
 
 use crate::{
-    format::{Action, Answer, File, Proves, Setpoint, Space, StateIs, StateName, Storage, UnitName},
+    format::{Action, Answer, FedBy, File, Proves, Setpoint, Space, StateIs, StateName, Storage, UnitName},
     scale::hundredths,
     source::{grade, line},
 };
@@ -391,6 +391,12 @@ impl<'a> Ladder<'a> {
                     self.say(
                         "what feeds its communication watchdog is not known",
                         "any request, or only a write?",
+                    );
+                }
+                if watchdog.fed_by == Answer::Given(FedBy::CommandWrite) {
+                    self.warn(
+                        "a command word alone feeds its communication watchdog, and none is repeated: where it is set, it acts behind each",
+                        "leave it off, and wire an emergency stop",
                     );
                 }
                 if watchdog.actions.is_unknown() {

@@ -3,7 +3,7 @@
 use drive_core::Direction;
 
 use crate::{
-    format::{Action, Answer, File, Guard, Register, Sign, Space, Step},
+    format::{Action, Answer, FedBy, File, Guard, Register, Sign, Space, Step},
     ladder::{Gap, Level},
 };
 
@@ -94,6 +94,12 @@ impl Profile {
         let is_constant =
             |of: &crate::format::Spanned<Guard>| of.get_ref().is.as_ref().is_some_and(|is| is.len() == 1);
         all.into_iter().any(is_constant).then_some("registers that only this drive reads so")
+    }
+
+    /// Whether whatever is asked feeds its communication watchdog.
+    pub(crate) fn is_fed_by_any_request(&self) -> bool {
+        let watchdog = self.file.watchdog.given().map(crate::format::Spanned::get_ref);
+        watchdog.is_some_and(|watchdog| watchdog.fed_by == Answer::Given(FedBy::AnyRequest))
     }
 
     /// How it is started in a direction.

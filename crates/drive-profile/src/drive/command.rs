@@ -89,7 +89,6 @@ impl<P: Port> ProfileDrive<P> {
             // An exception is no proof that nothing was done.
             Err(error) => return Err(error.after_write()),
         }
-        self.fed = Some(Instant::now());
         self.see_start(direction).await.map_err(Error::after_write)
     }
 

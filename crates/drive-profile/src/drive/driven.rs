@@ -5,7 +5,6 @@ use drive_core::{
     Refusal, Result, Row, Setpoint, Status, StopMode, Stopped, WatchdogCapability, Withdrawn, Written,
     async_trait, registers::refuse_commands,
 };
-use tokio::time::Instant;
 
 use super::ProfileDrive;
 
@@ -26,7 +25,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
     fn forget(&mut self) {
         self.watch.lose_sight();
         self.guarded.forget(&self.profile);
-        (self.comes_down, self.kept, self.fed, self.output_seen) = (None, None, None, None);
+        (self.comes_down, self.kept) = (None, None);
     }
 
     fn recognise(&self, _: &drive_core::Identity) -> Recognised {
@@ -54,11 +53,8 @@ impl<P: Port> Drive for ProfileDrive<P> {
             // Whoever cannot be asked is read all the same; nothing is written before the guards are seen.
             self.see_guards(Class::Status).await.ok();
         }
-        let began = Instant::now();
         let (mut status, words) = self.read_status(Class::Status).await?;
         self.judge(&mut status, &words);
-        // A drive that was not fed stops by its own watchdog, and the next status shows it.
-        self.feed(&status, began).await.ok();
         Ok(status)
     }
 
@@ -94,7 +90,8 @@ impl<P: Port> Drive for ProfileDrive<P> {
         self.pulse_reset().await
     }
 
-    /// A watchdog that its owner has told of and that the bus cannot set: it has to be fed.
+    /// A watchdog that its owner has told of and that the bus cannot set: it has to be fed. One that a command word alone feeds is not:
+    /// no run command is repeated, because nothing that the drive shows tells its run word from another master's stop at once.
     fn watchdog_capability(&self) -> Option<WatchdogCapability> {
         let fixed = |time| WatchdogCapability {
             min: time,
@@ -104,16 +101,11 @@ impl<P: Port> Drive for ProfileDrive<P> {
             settable: false,
             wears: false,
         };
-        self.owner.watchdog.map(fixed)
+        self.owner.watchdog.filter(|_| self.profile.is_fed_by_any_request()).map(fixed)
     }
 
-    /// A reading; where a command word feeds the watchdog, behind a look at the drive, the word that stands.
+    /// A reading, and nothing else.
     async fn keep_alive(&mut self) -> Result<()> {
-        if self.owner.watchdog.is_some() {
-            let began = Instant::now();
-            let (status, _) = self.read_status(Class::KeepAlive).await?;
-            return self.feed(&status, began).await;
-        }
         let Some(block) = self.fast.first().copied() else { return Ok(()) };
         self.read_block(Class::KeepAlive, block).await.map(drop)
     }

@@ -2,7 +2,6 @@
 
 mod command;
 mod driven;
-mod feed;
 mod guards;
 mod owner;
 mod plan;
@@ -12,10 +11,7 @@ mod tables;
 
 use std::sync::Arc;
 
-use drive_core::{
-    Error, ExceptionMeaning, Frequency, Port, Refusal, Registers, SlaveAddress, Status, Watch, interned,
-};
-use tokio::time::Instant;
+use drive_core::{Error, ExceptionMeaning, Port, Refusal, Registers, SlaveAddress, Status, Watch, interned};
 
 pub use owner::Owner;
 
@@ -40,10 +36,6 @@ pub struct ProfileDrive<P> {
     agreed: Option<i64>,
     /// The setpoint that the next start gives, in counts: of a drive whose setpoint is its run command.
     kept: Option<i32>,
-    /// When a command word of this side was last written.
-    fed: Option<Instant>,
-    /// The output at the last look behind which it could have been.
-    output_seen: Option<Frequency>,
     /// A stop of this side was seen, and the motor may still come down by it: its output then.
     comes_down: Option<u32>,
 }
@@ -70,8 +62,6 @@ impl<P: Port> ProfileDrive<P> {
             guarded,
             agreed: None,
             kept: None,
-            fed: None,
-            output_seen: None,
             comes_down: None,
         }
     }

@@ -15,7 +15,7 @@ pub struct Owner {
     /// That nothing but this bus commands it, neither terminals nor panel: taken for true where the drive does not tell, for a
     /// reset alone. No run command is told in force by it.
     pub commands_alone: bool,
-    /// The time of its communication watchdog as it is set at the drive: so that it is fed, where a command word alone feeds it too.
+    /// The time of its communication watchdog as it is set at the drive, of one that any request feeds: so that it is asked often enough.
     pub watchdog: Option<Duration>,
 }
 
