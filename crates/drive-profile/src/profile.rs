@@ -164,6 +164,22 @@ impl File {
         found.map(|written| written.value)
     }
 
+    /// The step of a reset that rises: the last that leaves at a place what does not stand there at its end, or that the drive clears by
+    /// itself. What comes behind it clears it.
+    pub(crate) fn rising(&self, reset: &Action) -> usize {
+        let steps: Vec<Vec<Written>> =
+            reset.steps.iter().map(|step| self.written(step.get_ref(), None)).collect();
+        let stays = |of: &Written| {
+            let place = |other: &&Written| (other.space, other.address) == (of.space, of.address);
+            steps.iter().flatten().rev().find(place).is_some_and(|last| last.value == of.value)
+        };
+        let rises = |writes: &Vec<Written>| !writes.iter().all(stays);
+        let clears_itself = reset.clears_itself == Some(true);
+        let writing = steps.iter().enumerate().rev().filter(|(_, writes)| !writes.is_empty());
+        let last = writing.map(|(at, _)| at).nth(usize::from(!clears_itself));
+        steps.iter().rposition(rises).filter(|_| !clears_itself).or(last).unwrap_or(0)
+    }
+
     /// Where the command reads back.
     pub(crate) fn read_back(&self) -> Option<(Space, u16)> {
         let read = self.ownership.reads_back.given()?;

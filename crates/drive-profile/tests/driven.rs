@@ -589,4 +589,55 @@ async fn a_shaft_is_told_at_rest_by_what_its_file_names_for_that() {
         let status = rig.until_machine("it stands", |machine| machine.shaft_frequency == 0).await;
         assert_eq!(status.motion, end);
     }
+/// Its profile has another word for reverse than the machine: the word is taken, and acts on nothing. What turns still turns by its stop.
+#[tokio::test(start_paused = true)]
+async fn a_start_is_not_confirmed_by_a_motor_that_still_comes_down_from_a_stop_of_this_side() {
+    let mut rig = misread("danfoss/danfoss-fc", "danfoss-fc", "words = [0x847C]", "words = [0x8C7C]");
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == 3_000).await;
+    rig.drive.stop(StopMode::Ramp).await.expect("it is seen to come down");
+    let error = rig.drive.start(Direction::Reverse).await.expect_err("it comes down, and that is all");
+    assert!(matches!(error, Error::NotConfirmed { .. }), "{error}");
+    assert!(rig.drive.lease().is_some(), "the word may act all the same");
+    rig.drive.stop(StopMode::Ramp).await.expect("it stops");
+    // What acts is confirmed, out of the same ramp.
+    rig.until_machine("it stands", |machine| machine.shaft_frequency == 0).await;
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == 3_000).await;
+    rig.drive.stop(StopMode::Ramp).await.expect("it is seen to come down");
+    rig.drive.start(Direction::Forward).await.expect("it rises again");
+}
+
+/// The word that clears it goes to a register that the drive refuses: the fault is gone, and the reset stands.
+#[tokio::test(start_paused = true)]
+async fn a_reset_whose_clearing_word_was_not_written_is_not_told_done() {
+    let other = "[register.STW2]\nwhat = \"another\"\naddress = 40103\naccess = \"read_write\"\nstorage = \"ram\"\nsource = \"oi2012 wb\"\n\n[register.HSW]\n";
+    let text = text("siemens/v20")
+        .replacen("[register.HSW]\n", other, 1)
+        .replace(
+            "{ write = \"STW\", words = [0x047C] }], seen",
+            "{ write = \"STW2\", words = [0x047C] }], seen",
+        )
+        .replace(
+            "{ write = \"STW\", words = [0x047E] }], clears_itself",
+            "{ write = \"STW2\", words = [0x047C] }], clears_itself",
+        );
+    let (of, other) = (family("v20"), family_of(read(&text).unwrap_or_else(|refusals| panic!("{refusals}"))));
+    let options = of.simulated_options();
+    let open = move |port, slave| other.open_with(port, slave, &options);
+    let machine = move || of.machine(SetUp::ForTheBus).expect("it has a twin");
+    let mut rig = Contract::new(other.capabilities(), open, machine).rig();
+    rig.machine.trip(9);
+    rig.until("the trip", |status| status.state == State::Fault).await;
+    let error = rig.drive.reset_faults().await.expect_err("its reset bit may stand");
+    assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
+    let to = |register: u16| {
+        let [a, b] = register.to_be_bytes();
+        rig.machine.received().iter().filter(|request| request.pdu.starts_with(&[6, a, b])).count()
+    };
+    assert!(to(102) > 1, "a level is written again: {}", to(102));
+    let rises =
+        rig.machine.received().iter().filter(|request| request.pdu[..] == [6, 0, 99, 0x04, 0xFE]).count();
+    assert_eq!(rises, 1, "an edge goes out once");
 }

@@ -13,7 +13,7 @@ use super::{
     tables::{mode_name, stop_mode},
 };
 use crate::{
-    format::{Action, Deed, Step},
+    format::{Action, Deed, Spanned, Step},
     ladder::Level,
     profile::{Profile, Written},
     requests::READ_WRITE,
@@ -36,6 +36,10 @@ const NO_SETPOINT: Refusal = Refusal::Settings(
 /// falls less in the time that a command has to show (200 s from 50 Hz) is seen by its end, and not by its beginning.
 const FALL: Frequency = Frequency::from_centihertz(50);
 
+/// How long an output that came down by a stop of this side has to go down no more, to be one that a start holds: at a tenth of a hertz
+/// a count a ramp of 200 s shows every 0.4 s.
+const HELD_FOR: Duration = Duration::from_secs(1);
+
 /// The most rungs of a ladder that are climbed for one start.
 const RUNGS: usize = 8;
 
@@ -53,7 +57,8 @@ impl<P: Port> ProfileDrive<P> {
         let (status, words) = self.read_status(Class::Command).await?;
         self.guard(order).await?;
         let local = self.commanded_by_other(&words);
-        let runs = matches!(status.state, State::Running | State::Stopping) && self.comes_down.is_none();
+        let was_fed = matches!(status.state, State::Running | State::Stopping);
+        let runs = was_fed && self.comes_down.is_none();
         let others = (runs && self.watch.run.lease().is_none()).then_some(NOT_OURS);
         if let Some(reason) = status.bars_motion().or(local).or(others) {
             return Err(self.refused(order, reason));
@@ -76,7 +81,7 @@ impl<P: Port> ProfileDrive<P> {
         let word = profile.file().run_word(action, self.kept).unwrap_or(0);
         self.watch.run.give(Lease::new(direction, word));
         let was_started = std::mem::replace(&mut self.guarded.started, true);
-        self.comes_down = None;
+        let came_down = self.comes_down.take();
         let sent = self.step(last.get_ref(), Class::Command, order).await;
         self.registers.owe_judgement();
         match sent {
@@ -84,12 +89,13 @@ impl<P: Port> ProfileDrive<P> {
             Err(error) if error.kind() == ErrorKind::NotSent => {
                 self.watch.run.was_not_written();
                 self.guarded.started = was_started;
+                self.comes_down = came_down;
                 return Err(if is_begun { error.after_write() } else { error });
             }
             // An exception is no proof that nothing was done.
             Err(error) => return Err(error.after_write()),
         }
-        self.see_start(direction).await.map_err(Error::after_write)
+        self.see_start(direction, was_fed).await.map_err(Error::after_write)
     }
 
     /// What has to be written before the run command, from the state in which the drive is.
@@ -124,11 +130,14 @@ impl<P: Port> ProfileDrive<P> {
         }
     }
 
-    /// Reads until the motor is driven that way. One that turned the other way slows down first: it is on its way.
-    async fn see_start(&mut self, direction: Direction) -> Result<Status> {
+    /// Reads until the motor is driven that way. One that turned the other way slows down first: it is on its way. One that comes down by
+    /// a stop of this side may do so still: it is driven once its output goes down no more.
+    async fn see_start(&mut self, direction: Direction, was_fed: bool) -> Result<Status> {
         let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
         let tells_direction = self.profile.file().see.direction.given().is_some();
         let mut first: Option<Frequency> = None;
+        let mut lowest = None;
+        let may_come_down = self.has_ended && was_fed && self.profile.file().see.output.given().is_some();
         loop {
             let (status, words) = match self.read_status(Class::Command).await {
                 Ok(read) => read,
@@ -139,8 +148,11 @@ impl<P: Port> ProfileDrive<P> {
             // By the evidence of a verdict: whatever keeps a run command from being in force keeps a start from being confirmed.
             let because = lacks(&self.evidence(&status, &words));
             let output = status.output_frequency;
-            let slows = output.is_some_and(|output| has_fallen(output, first));
-            if because.is_none() && (status.direction == Some(direction) || !tells_direction || slows) {
+            let slows = !may_come_down && output.is_some_and(|output| has_fallen(output, first));
+            let turns = status.direction == Some(direction) || !tells_direction || slows;
+            let is_held = !may_come_down || output.is_some_and(|output| holds(output, &mut lowest));
+            if because.is_none() && turns && is_held {
+                self.has_ended = false;
                 self.agreed = self.setpoint_seen(&words);
                 let verdict = self.watch.run.verdict(&self.evidence(&status, &words));
                 return Ok(Status { verdict, ..status });
@@ -167,6 +179,7 @@ impl<P: Port> ProfileDrive<P> {
         else {
             return Err(Error::Unsupported { what: "a stop", reason: "its profile has none" });
         };
+        self.has_ended = true;
         // What the drive shows is no proof of a stop that it has refused or never got: behind a trip, or a state in which no motor turns,
         // the run command may stand and act when that goes away.
         let mut written = self.write_stop(action, order).await?;
@@ -261,6 +274,7 @@ impl<P: Port> ProfileDrive<P> {
         let Some(step) = stop.and_then(|stop| stop.get_ref().steps.first()) else {
             return Err(Error::Unsupported { what: "a withdrawal", reason: "its profile has no stop" });
         };
+        self.has_ended = true;
         self.step(step.get_ref(), Class::Command, Order::Withdraw).await?;
         self.registers.owe_judgement();
         let mut confirming = Confirming::begin();
@@ -303,35 +317,59 @@ impl<P: Port> ProfileDrive<P> {
             None => return Err(self.refused(order, NOT_ALONE)),
             Some(_) => return Err(self.refused(order, OTHERS)),
         }
+        self.has_ended = true;
         // The run command goes first: none of this side's is to act when the fault is gone.
         if let Some(stop) = profile.file().stop.ramp.given().and_then(|stop| stop.get_ref().steps.first()) {
             self.step(stop.get_ref(), Class::Command, order).await?;
         }
-        let mut edge = Ok(());
-        for step in &reset.steps {
-            match self.step(step.get_ref(), Class::Command, order).await {
-                Err(error) if error.kind() == ErrorKind::NotSent => return Err(error),
-                Err(error) => edge = Err(error),
-                Ok(()) => {}
-            }
+        // What rises is an edge, and goes out once; what clears it is a level, and is written until it is there.
+        let (before, rest) = reset.steps.split_at(profile.file().rising(reset));
+        self.steps(before, order).await?;
+        let Some((rising, clearing)) = rest.split_first() else { return Err(self.refused(order, OTHERS)) };
+        let rise = self.take_step(rising.get_ref(), Class::Command, order, true).await;
+        if rise.as_ref().is_err_and(|error| error.kind() == ErrorKind::NotSent) {
+            return rise.map(|()| status);
         }
         self.registers.owe_judgement();
+        let mut cleared = self.steps(clearing, order).await;
         let mut confirming = Confirming::begin();
         loop {
-            let (status, _) = self.read_status(Class::Command).await.map_err(Error::after_write)?;
-            if !status.is_fault() {
+            let read = match self.read_status(Class::Command).await {
+                Err(error) if error.kind() != ErrorKind::NoAnswer => return Err(error.after_write()),
+                read => read,
+            };
+            if let Ok((status, _)) = &read
+                && !status.is_fault()
+                && cleared.is_ok()
+            {
                 self.watch.run.end();
-                return Ok(Status { verdict: None, ..status });
+                return Ok(Status { verdict: None, ..status.clone() });
             }
             if !confirming.again().await {
-                edge.map_err(Error::after_write)?;
+                rise.and(cleared).map_err(Error::after_write)?;
+                let (status, _) = read.map_err(Error::after_write)?;
                 return Err(self.not_confirmed(order, status, None));
+            }
+            if cleared.is_err() {
+                cleared = self.steps(clearing, order).await;
             }
         }
     }
 
-    /// One step of an action.
+    /// Steps of a command, each a level, up to the first that fails.
+    async fn steps(&mut self, steps: &[Spanned<Step>], order: Order) -> Result<()> {
+        for step in steps {
+            self.step(step.get_ref(), Class::Command, order).await?;
+        }
+        Ok(())
+    }
+
+    /// One step of an action, a level: what it writes may be written again.
     pub(super) async fn step(&mut self, step: &Step, class: Class, order: Order) -> Result<()> {
+        self.take_step(step, class, order, false).await
+    }
+
+    async fn take_step(&mut self, step: &Step, class: Class, order: Order, is_edge: bool) -> Result<()> {
         if let Some(pause) = &step.pause_ms {
             sleep(Duration::from_millis((*pause.get_ref()).into())).await;
         }
@@ -351,7 +389,7 @@ impl<P: Port> ProfileDrive<P> {
             }
         }
         let writes = self.profile.file().written(step, self.kept);
-        self.write(step, &writes, class, order).await
+        self.write(step, &writes, class, is_edge).await
     }
 
     /// What is about to be written. A command word is what reads back as one: a word for another register says nothing of it.
@@ -363,11 +401,10 @@ impl<P: Port> ProfileDrive<P> {
         }
     }
 
-    async fn write(&mut self, step: &Step, writes: &[Written], class: Class, order: Order) -> Result<()> {
+    async fn write(&mut self, step: &Step, writes: &[Written], class: Class, is_edge: bool) -> Result<()> {
         let function = step.function.as_ref().map(|function| *function.get_ref());
         let Some(request) = self.profile.request(function, writes) else { return Ok(()) };
         self.sends(writes);
-        let is_edge = order == Order::ResetFaults;
         let mut calls = self.registers.at(class);
         if is_edge {
             calls = calls.edge();
@@ -413,6 +450,19 @@ fn comes_down(status: &Status, first: Option<Frequency>) -> bool {
     below && has_fallen(output, first) && status.state == State::Running
 }
 
+/// Whether an output that may come down goes down no more: it has risen, or has had no lower one for [`HELD_FOR`].
+fn holds(output: Frequency, lowest: &mut Option<(Frequency, Instant)>) -> bool {
+    match *lowest {
+        Some((least, since)) if output >= least => {
+            has_fallen(least, Some(output)) || since.elapsed() >= HELD_FOR
+        }
+        _ => {
+            *lowest = Some((output, Instant::now()));
+            false
+        }
+    }
+}
+
 /// Whether an output is so far below another that it is no flicker of its register.
 fn has_fallen(output: Frequency, from: Option<Frequency>) -> bool {
     from.is_some_and(|from| {
@@ -437,6 +487,18 @@ mod tests {
         assert!(comes_down(&shown(19, hertz(20)), hertz(40)));
         assert!(!comes_down(&shown(40, hertz(50)), hertz(40)), "it holds its speed");
         assert!(!comes_down(&shown(39, hertz(50)), None), "one look tells nothing");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn an_output_that_comes_down_is_held_once_it_rises_or_stands_for_a_while() {
+        let mut lowest = None;
+        let mut look = |centihertz| holds(Frequency::from_centihertz(centihertz), &mut lowest);
+        assert!(!look(3_000) && !look(2_900) && !look(2_900) && !look(2_910), "a flicker is no rise");
+        assert!(look(2_950), "it rises");
+        assert!(!look(2_890), "and comes down again");
+        sleep(HELD_FOR).await;
+        assert!(look(2_890), "it stands");
+        assert!(!look(2_880));
     }
 
     #[test]

@@ -36,6 +36,8 @@ pub struct ProfileDrive<P> {
     agreed: Option<i64>,
     /// The setpoint that the next start gives, in counts: of a drive whose setpoint is its run command.
     kept: Option<i32>,
+    /// A word of this side that ends its run command was written, and no start was confirmed since.
+    has_ended: bool,
     /// A stop of this side was seen, and the motor may still come down by it: its output then.
     comes_down: Option<u32>,
 }
@@ -62,6 +64,7 @@ impl<P: Port> ProfileDrive<P> {
             guarded,
             agreed: None,
             kept: None,
+            has_ended: false,
             comes_down: None,
         }
     }
