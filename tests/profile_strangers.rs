@@ -72,7 +72,12 @@ fn kinds() -> Vec<Kind> {
         kind("wj200", "wj200.py"),
         kind("mx2", "wj200.py"),
         Kind { arguments: &["102"], ..kind("danfoss-fc", "danfoss.py") },
-        Kind { arguments: &["51"], ..kind("danfoss-fc51", "danfoss.py") },
+        // REF of 2666h is 60 %, 047Ch runs it by the FC profile: FC 202 Design Guide p. 175.
+        Kind {
+            arguments: &["51"],
+            others: &[(50_009, 0x2666), (49_999, 0x047C)],
+            ..kind("danfoss-fc51", "danfoss.py")
+        },
         kind("goodrive", "goodrive.py"),
         // Forward run, A. p. 786; 30 Hz.
         Kind { others: &[(0x2001, 3_000), (0x2000, 0x12)], trip: 1, ..kind("ms300", "ms300.py") },

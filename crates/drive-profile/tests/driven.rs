@@ -14,8 +14,7 @@ use drive_testing::{
 };
 
 /// Those that reach motion and show the setpoint that they hold: of the VF-S15 a setpoint is not confirmed before it is started.
-const DRIVEN: [&str; 9] =
-    ["danfoss-fc", "goodrive", "ig5a", "v20", "g120", "danfoss-fc51", "altivar", "wj200", "mx2"];
+const DRIVEN: [&str; 8] = ["danfoss-fc", "goodrive", "ig5a", "v20", "g120", "altivar", "wj200", "mx2"];
 
 fn family(key: &str) -> Family {
     family_of(shipped::find(key).expect("it is shipped").clone())
