@@ -60,6 +60,15 @@ use crate::{
     snapshot::{Counters, Link, Snapshot, Timed, Trip},
 };
 
+/// What was written last that changes the motor, and why.
+#[derive(Debug)]
+struct Acted {
+    job: Job,
+    cause: Cause,
+    /// No status has come since.
+    is_new: bool,
+}
+
 /// Names a caller that waits for an outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct CallId(pub(crate) u64);
@@ -159,7 +168,7 @@ pub(crate) struct Supervisor {
     /// Who has taken control, until it is back.
     control_taken: Option<Control>,
     /// The last job that was sent to change what the motor does, and why.
-    acted: Option<(Job, Cause)>,
+    acted: Option<Acted>,
     /// The words that changed with the status that is looked at.
     words: Arc<[ChangedWord]>,
     /// Since when something troubles the drive.
@@ -584,7 +593,7 @@ impl Supervisor {
             Job::Start(_) | Job::ResetFaults | Job::Release => self.active.as_ref().map(Active::cause),
             _ => return,
         };
-        self.acted = cause.map(|cause| (job, cause));
+        self.acted = cause.map(|cause| Acted { job, cause, is_new: true });
     }
 
     /// What a job writes to the EEPROM, and why: known while who asks for it stands, for a stop ends what it drops.

@@ -9,7 +9,7 @@ use std::{
 use drive_core::{Control, Error, Faults, Measurements, Motion, PortError, Result, Status};
 use tokio::time::Instant;
 
-use super::{Asker, Job, Supervisor};
+use super::{Acted, Asker, Job, Supervisor};
 use crate::{
     cause::{Cause, ChangedWord, Policy},
     event::EventKind,
@@ -136,17 +136,25 @@ impl Supervisor {
     }
 
     fn compare(&mut self, before: Option<&Status>, status: &Status, found: bool) {
-        let cause = if found { Cause::Found } else { Cause::Drive };
+        let mut changed_by = None;
         if let Some(before) = before {
             let (from, to) = (before.state, status.state);
             if from != to {
                 let cause = if found { Cause::Found } else { self.cause_of(before, status) };
                 self.emit_shown(EventKind::StateChanged { from, to }, cause.clone());
                 if before.is_fault() && !status.is_fault() {
-                    self.emit_shown(EventKind::FaultCleared, cause);
+                    self.emit_shown(EventKind::FaultCleared, cause.clone());
                 }
+                changed_by = Some(cause);
             }
         }
+        self.compare_besides(before, status, found);
+        self.note_seen(changed_by.as_ref(), status);
+    }
+
+    /// What else a status shows otherwise than the one before: its warning, and who has control.
+    fn compare_besides(&mut self, before: Option<&Status>, status: &Status, found: bool) {
+        let cause = if found { Cause::Found } else { Cause::Drive };
         let warned = before.and_then(|before| before.warning).unwrap_or(false);
         if let Some(present) = status.warning
             && present != warned
@@ -157,8 +165,8 @@ impl Supervisor {
         match (somebody_else(before), somebody_else(status)) {
             (was, is) if was == is => {}
             (Some(was), None) => {
-                let start = self.acted.as_ref().filter(|(job, _)| matches!(job, Job::Start(_)));
-                match start.map(|(_, cause)| cause.clone()).filter(|_| self.control_taken.is_none()) {
+                let start = self.acted.as_ref().filter(|acted| matches!(acted.job, Job::Start(_)));
+                match start.map(|acted| acted.cause.clone()).filter(|_| self.control_taken.is_none()) {
                     // It was not taken from this bus: so some drives stand until they are started.
                     Some(start) => self.emit_shown(EventKind::StartTookCommand(was), start),
                     None => self.emit_shown(EventKind::ControlReturned, cause),
@@ -171,8 +179,8 @@ impl Supervisor {
                 self.given = None;
                 // The reset of an Altivar 21 zeroes its command word (Modbus §6.4): so it gives command back, too.
                 let given =
-                    self.acted.as_ref().filter(|(job, _)| matches!(job, Job::Release | Job::ResetFaults));
-                match given.map(|(_, cause)| cause.clone()) {
+                    self.acted.as_ref().filter(|acted| matches!(acted.job, Job::Release | Job::ResetFaults));
+                match given.map(|acted| acted.cause.clone()) {
                     _ if found => self.emit_shown(EventKind::ControlElsewhere(is), Cause::Found),
                     // It was given, not taken.
                     Some(act) => {
@@ -190,14 +198,38 @@ impl Supervisor {
 
     /// Why a state became another: by what was last written, if that does it; else the drive did it by itself.
     fn cause_of(&self, from: &Status, to: &Status) -> Cause {
-        let Some((job, cause)) = &self.acted else { return Cause::Drive };
+        let Some(Acted { job, cause, is_new }) = &self.acted else { return Cause::Drive };
         let does_it = match job {
             Job::Start(_) => !from.is_fault() && !to.is_fault() && from.motion != Motion::Driven,
-            Job::Stop(_) | Job::Withdraw => !to.is_fault() && to.motion != Motion::Driven,
+            // They end a run, and clear no fault. A motor that stands already is released by somebody else, unless it is seen at once.
+            Job::Stop(_) | Job::Withdraw => {
+                (from.state.is_moving() || *is_new)
+                    && !from.is_fault()
+                    && !to.is_fault()
+                    && to.motion != Motion::Driven
+            }
             Job::ResetFaults => from.is_fault() && !to.is_fault(),
             _ => false,
         };
         if does_it { cause.clone() } else { Cause::Drive }
+    }
+
+    /// A status was looked at. What was written is over when the drive has done something else since: what follows from that is
+    /// not told as its doing.
+    fn note_seen(&mut self, changed_by: Option<&Cause>, status: &Status) {
+        let goes_on = self.active.is_some() || self.stopping.is_some() || self.withdrawal.is_some();
+        let is_over = |acted: &Acted| match acted.job {
+            Job::Start(_) | Job::Stop(_) | Job::Withdraw => {
+                changed_by.is_some_and(|cause| *cause != acted.cause)
+            }
+            // It did not clear the fault.
+            Job::ResetFaults => status.is_fault() && !acted.is_new,
+            _ => false,
+        };
+        self.acted = self.acted.take().filter(|acted| goes_on || !is_over(acted));
+        if let Some(acted) = &mut self.acted {
+            acted.is_new = false;
+        }
     }
 
     /// A motor that turns without the watchdog of its contract is an alarm.

@@ -47,6 +47,55 @@ fn what_the_drive_does_by_a_command_names_the_command_and_what_it_does_by_itself
 }
 
 #[test]
+fn a_reset_at_the_drive_is_not_the_doing_of_the_policy_that_withdrew_the_run_command() {
+    let mut rig = Rig::ready();
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    rig.drive.trip(9);
+    rig.pass(2_000 * MS);
+    assert!(rig.drive.log.contains(&Job::Withdraw), "{:?}", rig.drive.log);
+    rig.outputs.clear();
+    rig.drive.stand();
+    rig.drive.status.fault_code = None;
+    rig.pass(1_000 * MS);
+    for event in ["state changed", "fault cleared"] {
+        assert_eq!(rig.cause_of(event), Some(Cause::Drive), "{event}: {:?}", rig.outputs);
+    }
+}
+
+#[test]
+fn an_output_that_is_released_at_the_drive_is_not_the_doing_of_the_policy_that_withdrew_the_run_command() {
+    let mut rig = Rig::ready();
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    rig.drive.stand();
+    rig.drive.status.state = State::NotReady;
+    rig.pass(2_000 * MS);
+    assert!(rig.drive.log.contains(&Job::Withdraw), "{:?}", rig.drive.log);
+    rig.outputs.clear();
+    rig.drive.stand();
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.cause_of("state changed"), Some(Cause::Drive), "{:?}", rig.outputs);
+}
+
+#[test]
+fn what_somebody_else_starts_and_stops_later_is_not_told_as_the_command_of_before() {
+    let mut rig = Rig::ready();
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    rig.stop(StopMode::Ramp);
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.cause_of("stop confirmed"), by_the_tester(), "{:?}", rig.outputs);
+    let by_another: [fn(&mut Paper); 4] = [Paper::run, Paper::stand, Paper::run, Paper::stand];
+    for does in by_another {
+        rig.outputs.clear();
+        does(&mut rig.drive);
+        rig.pass(2_000 * MS);
+        assert_eq!(rig.cause_of("state changed"), Some(Cause::Drive), "{:?}", rig.outputs);
+    }
+}
+
+#[test]
 fn a_stop_says_who_stopped_and_a_removal_is_no_exit() {
     for (policy, name) in [(Policy::Exit, "exit"), (Policy::Removal, "removed")] {
         let mut rig = Rig::ready();
