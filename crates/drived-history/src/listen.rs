@@ -289,6 +289,8 @@ fn said(frame: &str, now: Moment, alarms: &mut Alarms) -> Option<Record> {
             }
             let ToldAlarm { state, drive, line, text, .. } = told;
             let is_alarm = state == "unacknowledged";
+            // An alarm keeps its words: its end is not told as if it came.
+            let text = if is_alarm { text } else { format!("{state}: {text}") };
             Some(Record { kind: Kind::Alarm, what: state, drive, line, is_alarm, text, ..record })
         }
         "command" => {
@@ -404,6 +406,18 @@ async fn tell(plant: Plant, mut health: watch::Receiver<Health>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_end_of_an_alarm_is_not_told_with_the_words_of_its_beginning() {
+        let now = Moment { steady_ms: 0, wall_ms: 0 };
+        let mut alarms = Alarms::default();
+        let mut told = |state: &str| {
+            let data = serde_json::json!({ "id": 7, "count": 1, "state": state, "line": "north", "text": "no drive answers" });
+            said(&format!("id: 1\nevent: alarm\ndata: {data}\n\n"), now, &mut alarms).unwrap().text
+        };
+        assert_eq!(told("unacknowledged"), "no drive answers");
+        assert_eq!(told("over"), "over: no drive answers");
+    }
 
     #[test]
     fn an_alarm_that_is_told_again_for_those_that_follow_from_it_is_kept_once() {

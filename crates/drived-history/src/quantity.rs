@@ -151,6 +151,7 @@ impl Quantity {
     pub const OUTPUT_FREQUENCY: Self = Self(1);
     pub const SETPOINT: Self = Self(2);
     pub const CURRENT: Self = Self(3);
+    pub const CONTROL: Self = Self(6);
     pub const WARNING: Self = Self(8);
     pub const FAULT_CODE: Self = Self(9);
     pub const DC_BUS_VOLTAGE: Self = Self(14);

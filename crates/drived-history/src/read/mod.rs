@@ -34,6 +34,8 @@ use crate::{
 
 /// The bits of a chunk's number that are its source's.
 pub const SOURCE_BITS: u32 = 20;
+/// Among so many of the newest records a drive is looked for of which no value has been written yet.
+const UNSOURCED: i64 = 20_000;
 /// No block is longer than this, so that none that begins earlier has to be looked at.
 pub const LONGEST_BLOCK_MS: i64 = 2 * 3_600_000;
 
@@ -51,13 +53,17 @@ impl History {
     }
 }
 
-/// The drives of which there is something.
+/// The drives of which there is something: values, or what happened to one in the first minute.
 ///
 /// # Errors
 /// It cannot be read.
 pub fn drives(connection: &Connection) -> Result<Vec<String>, StoreError> {
-    let mut find = connection.prepare_cached("SELECT DISTINCT drive FROM source ORDER BY drive")?;
-    let rows = find.query_map([], |row| row.get(0))?;
+    let mut find = connection.prepare_cached(
+        "SELECT drive FROM source UNION
+         SELECT drive FROM record WHERE drive IS NOT NULL AND id > (SELECT max(id) FROM record) - ?1
+         ORDER BY drive",
+    )?;
+    let rows = find.query_map([UNSOURCED], |row| row.get(0))?;
     Ok(rows.collect::<Result<_, _>>()?)
 }
 

@@ -34,6 +34,10 @@ pub(super) struct Facts {
     pub(super) gaps: Vec<(i64, i64)>,
     /// What its inputs showed, from each of these moments on.
     pub(super) inputs: Vec<(i64, i64)>,
+    /// By what it was commanded, from each of these moments on.
+    pub(super) controls: Vec<(i64, String)>,
+    /// When other drives of its line were heard.
+    pub(super) heard: Vec<(String, Vec<(i64, i64)>)>,
     /// How many frames of somebody else its line heard, minute by minute: when the minute ended, and how many.
     pub(super) foreigners: Vec<(i64, i64)>,
 }
@@ -42,6 +46,10 @@ pub(super) struct Facts {
 const TOLD_AGAIN_MS: i64 = 60_000;
 /// A gap that is told: shorter ones are lost polls.
 const GAP_MS: i64 = 5_000;
+/// What a drive shows when it is seen again is told of it within this time.
+const SEEN_AGAIN_MS: i64 = 3_000;
+/// So many other drives of a line are looked at, whether they were heard.
+const NEIGHBOURS: usize = 64;
 
 impl Facts {
     pub(super) fn gather(connection: &Connection, drive: &str, at: i64) -> Result<Self, StoreError> {
@@ -52,10 +60,7 @@ impl Facts {
         let Found { records, is_cut } = records(connection, &filter)?;
         let of_drive = |found: &&RecordView| found.drive.as_deref() == Some(drive);
         let line = records.iter().filter(of_drive).find_map(|found| found.line.clone());
-        let spans: Vec<(i64, i64)> = pieces(connection, drive, Quantity::STATE, from, to)?
-            .into_iter()
-            .flat_map(|piece| known_spans(&piece.closed()))
-            .collect();
+        let spans = heard(connection, drive, from, to)?;
         let known: i64 = spans.iter().map(|(start, end)| end - start).sum();
         let mut gaps = Vec::new();
         let mut until = from;
@@ -79,8 +84,54 @@ impl Facts {
             .filter(|minute| Some(&minute.line) == line.as_ref() && minute.foreign > 0)
             .map(|minute| (minute.time_unix_ms, minute.foreign))
             .collect();
+        let controls = pieces(connection, drive, Quantity::CONTROL, from, to)?
+            .into_iter()
+            .flat_map(|piece| piece.points)
+            .filter_map(|point| Some((point.at, Quantity::CONTROL.text(point.count?))))
+            .collect();
         let drive = drive.to_owned();
-        Ok(Self { drive, line, from, to, records, is_cut, known, gaps, inputs, foreigners })
+        let mut facts = Self {
+            drive,
+            line,
+            from,
+            to,
+            records,
+            is_cut,
+            known,
+            gaps,
+            inputs,
+            controls,
+            heard: Vec::new(),
+            foreigners,
+        };
+        let neighbours: Vec<String> =
+            facts.neighbours().into_iter().take(NEIGHBOURS).map(str::to_owned).collect();
+        for name in neighbours {
+            let spans = heard(connection, &name, from, to)?;
+            facts.heard.push((name, spans));
+        }
+        Ok(facts)
+    }
+
+    /// The time around a moment in which nothing is known of the drive.
+    pub(super) fn gap_at(&self, at: i64) -> Option<(i64, i64)> {
+        self.gaps.iter().copied().find(|(start, end)| (*start..=*end).contains(&at))
+    }
+
+    /// The last time in which nothing was known of the drive, of those that ended no longer than a moment before it was seen again.
+    pub(super) fn gap_before(&self, at: i64) -> Option<(i64, i64)> {
+        self.gaps.iter().rev().copied().find(|(start, end)| *start < at && at <= *end + SEEN_AGAIN_MS)
+    }
+
+    /// Drives of its line that were heard all the time between two moments.
+    pub(super) fn heard_between(&self, from: i64, to: i64) -> Vec<&str> {
+        let is_heard = |spans: &[(i64, i64)]| spans.iter().any(|(start, end)| *start <= from && to <= *end);
+        self.heard.iter().filter(|(_, spans)| is_heard(spans)).map(|(name, _)| &**name).collect()
+    }
+
+    /// By what it was commanded at a moment, in the drive's own words.
+    pub(super) fn control_at(&self, at: i64) -> Option<&str> {
+        self.controls.iter().rev().find(|(since, _)| *since <= at).map(|(_, control)| &**control)
     }
 
     /// Why something may have been asked for or have happened between two moments that is not among the records; `None`: nothing is missing.
@@ -178,6 +229,18 @@ impl Facts {
     }
 }
 
+/// When something began: a loss with the silence, and not when patience was over.
+pub(super) fn begins(found: &RecordView) -> i64 {
+    let silent = if found.what == "lost" { body(found).silent_for_ms.unwrap_or_default() } else { 0 };
+    found.time_unix_ms - i64::try_from(silent).unwrap_or_default()
+}
+
+/// When a drive was heard.
+fn heard(connection: &Connection, drive: &str, from: i64, to: i64) -> Result<Vec<(i64, i64)>, StoreError> {
+    let pieces = pieces(connection, drive, Quantity::STATE, from, to)?.into_iter();
+    Ok(pieces.flat_map(|piece| known_spans(&piece.closed())).collect())
+}
+
 /// The times in which something is known, of points that end with nothing.
 fn known_spans(points: &[crate::column::Point]) -> Vec<(i64, i64)> {
     let mut spans = Vec::new();
@@ -226,6 +289,9 @@ pub(super) struct Body {
     pub(super) last_known_unix_ms: Option<i64>,
     #[serde(default)]
     pub(super) since_unix_ms: Option<i64>,
+    /// For how long a lost drive had been silent.
+    #[serde(default)]
+    pub(super) silent_for_ms: Option<u64>,
     /// How many records could not be kept.
     #[serde(default)]
     pub(super) records: Option<u64>,

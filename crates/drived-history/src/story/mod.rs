@@ -14,9 +14,15 @@ use rusqlite::Connection;
 use self::facts::{Facts, body};
 use crate::{quantity::Quantity, read::pieces, store::StoreError};
 
-/// So near to a moment is what somebody means who tells its minute.
-const NEAR_BEFORE_MS: i64 = 90_000;
-const NEAR_AFTER_MS: i64 = 150_000;
+/// A moment that is a whole minute means that minute.
+const MINUTE_MS: i64 = 60_000;
+/// So long after it happened a drive shows something at the latest, as a rule; the clock of whoever asks is not this one.
+const SHOWN_MS: i64 = 3_000;
+const CLOCK_MS: i64 = 1_000;
+/// What is farther away than this is not what is asked for.
+const FAR_MS: i64 = 10_000;
+/// What is heavier than what is asked for is told beside it within this time.
+const BESIDE_MS: i64 = 300_000;
 /// From so long before the event,
 const COURSE_BEFORE_MS: i64 = 120_000;
 /// to so long after it is told what happened.
@@ -24,8 +30,8 @@ const COURSE_AFTER_MS: i64 = 300_000;
 /// So many sentences at the most.
 const COURSE: usize = 60;
 
-/// What a story is about, the weightiest first.
-const WEIGHT: [&str; 17] = [
+/// What a story is about, the weightiest first. `run`: a motor began or ceased to run.
+const WEIGHT: [&str; 24] = [
     "tripped",
     "stop_unconfirmed",
     "other_family",
@@ -34,26 +40,40 @@ const WEIGHT: [&str; 17] = [
     "output_blocked",
     "reference_taken",
     "command_overridden",
+    "run_not_adopted",
     "control_taken",
     "watchdog_not_in_force",
     "lost",
+    "fault_cleared",
+    "run",
     "output_departed",
-    "state_changed",
+    "limit",
     "stop",
     "start",
+    "reset",
+    "release",
     "setpoint",
-    "connected",
+    "warning",
+    "control_returned",
+    "state_changed",
 ];
+/// What is heavier than anything that a person does.
+const HEAVY: usize = 12;
 
-/// Tells the story of a drive at a moment.
+/// Tells the story of a drive at a moment; at that minute, where it is a whole one.
 ///
 /// # Errors
 /// The file cannot be read.
 pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, StoreError> {
     let facts = Facts::gather(connection, drive, at)?;
-    let about = about(&facts, at);
+    let asked = Asked::of(at);
+    let about = about(&facts, asked);
     let moment = about.map_or(at, |found| found.time_unix_ms);
-    let why = about.map(|about| cause::causes(&facts, about)).unwrap_or_default();
+    let mut why = match about {
+        Some(about) => cause::causes(&facts, about),
+        None => cause::of_nothing(&facts, at),
+    };
+    why.extend(beside(&facts, about, moment));
     Ok(Story {
         drive: drive.to_owned(),
         about: about.map(|found| Sentence::of(Certainty::Seen, facts.in_words(found)).at(found.time_unix_ms)),
@@ -64,29 +84,123 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
     })
 }
 
-/// What somebody means who asks for this moment: the weightiest near it, else what is nearest to it.
-fn about(facts: &Facts, at: i64) -> Option<&RecordView> {
-    let weight = |found: &RecordView| {
-        let place = WEIGHT.iter().position(|what| *what == found.what)?;
-        // A motor that begins to run, or goes on from one state at rest to another, is no incident.
-        (found.what != "state_changed" || ends_a_run(found)).then_some(place)
-    };
-    let of_drive = || {
-        let is_one =
-            |found: &&RecordView| matches!(&*found.kind, "event" | "command") && facts.is_of_drive(found);
-        facts.records.iter().filter(is_one).filter_map(|found| Some((weight(found)?, found)))
-    };
-    let is_near =
-        |found: &RecordView| (at - NEAR_BEFORE_MS..=at + NEAR_AFTER_MS).contains(&found.time_unix_ms);
-    let near =
-        of_drive().filter(|(_, found)| is_near(found)).min_by_key(|(weight, found)| (*weight, found.number));
-    let nearest = || of_drive().min_by_key(|(weight, found)| ((found.time_unix_ms - at).abs(), *weight));
-    near.or_else(nearest).map(|(_, found)| found)
+/// What is asked for: a moment, or the minute that begins with it.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    from: i64,
+    to: i64,
 }
 
-fn ends_a_run(found: &RecordView) -> bool {
-    let body = body(found);
-    body.from.as_deref() == Some("running") && body.to.as_deref() != Some("running")
+impl Asked {
+    const fn of(at: i64) -> Self {
+        let lasts = if at.rem_euclid(MINUTE_MS) == 0 { MINUTE_MS - 1 } else { 0 };
+        Self { from: at, to: at + lasts }
+    }
+
+    /// How far away something is.
+    fn distance(self, at: i64) -> i64 {
+        (self.from - at).max(at - self.to).max(0)
+    }
+
+    /// Whether it is what was meant, as exactly as a clock is read and a drive is polled.
+    fn is_met_by(self, at: i64) -> bool {
+        (self.from - CLOCK_MS..=self.to + SHOWN_MS).contains(&at)
+    }
+}
+
+/// How much something weighs; `None`: no story is about it.
+fn weight(found: &RecordView) -> Option<usize> {
+    let of = |what: &str| WEIGHT.iter().position(|one| *one == what);
+    let is_run = || {
+        let body = body(found);
+        let runs = |state: Option<&str>| state == Some("running");
+        let begins = !runs(body.from.as_deref()) && runs(body.to.as_deref());
+        let ends = runs(body.from.as_deref()) && !runs(body.to.as_deref());
+        // A start that was asked for is told as that.
+        ends || begins && !matches!(body.cause, Some(facts::Cause::Command { .. }))
+    };
+    match &*found.what {
+        "state_changed" if is_run() => of("run"),
+        what => of(what),
+    }
+}
+
+/// What there is of the drive that a story can be about, with its weight and its beginning.
+fn told_of<'a>(facts: &'a Facts) -> impl Iterator<Item = (usize, i64, &'a RecordView)> {
+    let is_one =
+        |found: &&RecordView| matches!(&*found.kind, "event" | "command") && facts.is_of_drive(found);
+    facts
+        .records
+        .iter()
+        .filter(is_one)
+        .filter_map(|found| Some((weight(found)?, facts::begins(found), found)))
+}
+
+/// What somebody means who asks for this moment: the weightiest of what was then; else what is nearest, within seconds; else what was found
+/// when the drive was seen again, where nobody saw it then. `None`: nothing happened.
+fn about<'a>(facts: &'a Facts, asked: Asked) -> Option<&'a RecordView> {
+    let then = told_of(facts)
+        .filter(|(_, begins, _)| asked.is_met_by(*begins))
+        .min_by_key(|(weight, begins, found)| (*weight, asked.distance(*begins), found.number));
+    let near = || {
+        told_of(facts)
+            .filter(|(_, begins, _)| asked.distance(*begins) <= SHOWN_MS)
+            .min_by_key(|(weight, begins, found)| (asked.distance(*begins), *weight, found.number))
+    };
+    let unseen = || {
+        let (start, end) = facts.gap_at(asked.from)?;
+        told_of(facts)
+            .filter(|(weight, begins, found)| {
+                *weight <= HEAVY + 1
+                    && (*begins >= asked.from || found.what == "lost")
+                    && (start - CLOCK_MS..=end + SHOWN_MS).contains(begins)
+            })
+            .min_by_key(|(weight, _, found)| (*weight, found.number))
+    };
+    let soon = || {
+        told_of(facts)
+            .filter(|(weight, begins, _)| {
+                *weight <= HEAVY + 1 && (asked.from..=asked.to + FAR_MS).contains(begins)
+            })
+            .min_by_key(|(weight, begins, found)| (asked.distance(*begins), *weight, found.number))
+    };
+    then.or_else(near).or_else(unseen).or_else(soon).map(|(_, _, found)| found)
+}
+
+/// What is heavier than what is asked for, before and after it: it is told that it was, and as nothing's cause. Where nothing happened, what
+/// was next.
+fn beside(facts: &Facts, about: Option<&RecordView>, moment: i64) -> Vec<Sentence> {
+    let known = about.and_then(weight);
+    let is_told = |weight: usize, begins: i64| match known {
+        Some(known) => weight < known.min(HEAVY) && (begins - moment).abs() <= BESIDE_MS,
+        None => true,
+    };
+    let number = about.map_or(0, |about| about.number);
+    let others = || {
+        told_of(facts).filter(|(weight, begins, found)| {
+            found.number != number && found.time_unix_ms != moment && is_told(*weight, *begins)
+        })
+    };
+    let before = others().filter(|(_, begins, _)| *begins < moment).max_by_key(|(_, begins, _)| *begins);
+    let after = others().filter(|(_, begins, _)| *begins >= moment).min_by_key(|(_, begins, _)| *begins);
+    let word = if about.is_some() { "" } else { "next " };
+    let told = [(before, "before"), (after, "after")];
+    told.into_iter()
+        .filter_map(|(found, side)| {
+            let (_, begins, found) = found?;
+            let away = lasting((begins - moment).abs());
+            let text = format!("{word}{side} it, {away} away: {}", facts.in_words(found));
+            Some(Sentence::of(Certainty::Seen, text).at(found.time_unix_ms))
+        })
+        .collect()
+}
+
+/// A time as a person says it.
+fn lasting(ms: i64) -> String {
+    match ms {
+        ..120_000 => format!("{:.1} s", ms as f64 / 1_000.0),
+        _ => format!("{} min", (ms + 30_000) / 60_000),
+    }
 }
 
 /// How the drive was a moment before something happened.
@@ -101,8 +215,9 @@ fn before(connection: &Connection, facts: &Facts, moment: i64) -> Result<Vec<Sen
         (Quantity::DC_BUS_VOLTAGE, "DC bus ", " V"),
         (Quantity::MOTOR_THERMAL, "motor's thermal state ", " %"),
     ];
-    // The status that shows what happened was read at that moment; the one before it is asked for.
-    let at = moment - 1_000;
+    // The status that shows what happened was read at that moment; the one before it is asked for, or the last one before it was not seen.
+    let gap = facts.gap_before(moment).map(|(start, _)| start);
+    let at = gap.unwrap_or(moment - 1_000);
     let mut known = Vec::new();
     for (quantity, label, unit) in shown {
         let pieces = pieces(connection, &facts.drive, quantity, moment - 60_000, at)?;
@@ -123,7 +238,15 @@ fn before(connection: &Connection, facts: &Facts, moment: i64) -> Result<Vec<Sen
     }
     match known.is_empty() {
         true => said.push(Sentence::of(Certainty::NotKnown, "how it was a moment before is not known")),
-        false => said.push(Sentence::of(Certainty::Seen, known.join(", ")).at(at)),
+        false => {
+            let text = match gap {
+                Some(start) => {
+                    format!("{} (as it was read last, {} before)", known.join(", "), lasting(moment - start))
+                }
+                None => format!("{} (as the poll before showed it)", known.join(", ")),
+            };
+            said.push(Sentence::of(Certainty::Seen, text).at(at));
+        }
     }
     Ok(said)
 }
@@ -139,7 +262,11 @@ fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
             "event" => facts.is_of_drive(found) || of_line && weighs,
             "command" => facts.is_of_drive(found),
             // What an alarm is of stands beside it as an event, but for those of a line.
-            "alarm" => of_line && found.drive.is_none(),
+            "alarm" => {
+                of_line
+                    && found.drive.is_none()
+                    && matches!(&*found.what, "unacknowledged" | "returned" | "over")
+            }
             _ => true,
         };
         is_near && is_meant
@@ -201,7 +328,7 @@ fn not_known(facts: &Facts, moment: i64, is_about: bool) -> Vec<Sentence> {
         if found.what == "began_after_kill"
             && let Some(last) = body(found).last_known_unix_ms
         {
-            let text = "this program did not run between its last record and its new beginning: what happened meanwhile was seen by nobody";
+            let text = "this is the last that was kept before this program was killed: when that was is not known, and of what it read and did until then up to a minute may be missing here; then it did not run until it began again";
             said.push(Sentence::of(Certainty::NotKnown, text).at(last));
         }
         if found.what == "hole" {
@@ -211,7 +338,7 @@ fn not_known(facts: &Facts, moment: i64, is_about: bool) -> Vec<Sentence> {
     for (start, end) in &facts.gaps {
         if is_near(*start) || is_near(*end) || (*start..=*end).contains(&moment) {
             let text =
-                format!("for {:.1} s nothing was read from {}", (end - start) as f64 / 1_000.0, facts.drive);
+                format!("for {} from then on no value of {} is known", lasting(end - start), facts.drive);
             said.push(Sentence::of(Certainty::NotKnown, text).at(*start));
         }
     }
@@ -220,12 +347,10 @@ fn not_known(facts: &Facts, moment: i64, is_about: bool) -> Vec<Sentence> {
         said.push(Sentence::of(Certainty::NotKnown, text));
     }
     let share = facts.known * 100.0;
-    let minutes = (facts.to - facts.from) / 60_000;
+    let around = lasting(facts.to - facts.from);
     let text = match is_about {
-        true => format!("{share:.0} % of the {minutes} minutes around it are known"),
-        false => {
-            format!("nothing is recorded of it then; {share:.0} % of the {minutes} minutes around are known")
-        }
+        true => format!("{share:.0} % of the {around} around it are known"),
+        false => format!("nothing is recorded of it then; {share:.0} % of the {around} around are known"),
     };
     let certainty = if is_about || share >= 99.0 { Certainty::Seen } else { Certainty::NotKnown };
     said.push(Sentence::of(certainty, text));

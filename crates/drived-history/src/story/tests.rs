@@ -22,9 +22,15 @@ use tokio::{
 use super::{Certainty, Story, tell};
 use crate::{
     listen::{Clocks, Listening},
+    quantity::{Quantity, Set},
     record::{Kind, Moment, Record},
     store,
-    write::{archive::Archive, inbox::Inbox, writer::Health},
+    tracker::Tracker,
+    write::{
+        archive::Archive,
+        inbox::{Batch, Inbox, Shown},
+        writer::Health,
+    },
 };
 
 /// 2026-11-21 03:00 UTC.
@@ -269,10 +275,42 @@ impl Written {
     }
 
     fn event(&mut self, at: i64, what: &str, text: &str, body: Option<serde_json::Value>) {
+        self.kept(Kind::Event, Some("pump 1"), at, what, text, body);
+    }
+
+    fn kept(
+        &mut self,
+        kind: Kind,
+        drive: Option<&str>,
+        at: i64,
+        what: &str,
+        text: &str,
+        body: Option<serde_json::Value>,
+    ) {
         let record = Record::of_history(on_wall(at), what, text);
-        let (drive, line) = (Some("pump 1".to_owned()), Some("north".to_owned()));
+        let (drive, line) = (drive.map(str::to_owned), Some("north".to_owned()));
         let body = body.map(|body| body.to_string());
-        self.archive.record(Record { kind: Kind::Event, drive, line, body, ..record });
+        self.archive.record(Record { kind, drive, line, body, ..record });
+    }
+
+    /// It is read every second, and shows that it is ready.
+    fn heard_for(&mut self, seconds: i64) {
+        let mut tracker = Tracker::default();
+        for at in (0..seconds).map(|second| second * 1_000) {
+            let Some(seen) = tracker.see(at, 3_000, &[(Quantity::STATE, 2)]) else { continue };
+            let shown = vec![Shown { drive: "pump 1".into(), set: Set::Status, seen }];
+            self.archive.take(Batch { shown, ..Batch::default() }, on_wall(at));
+        }
+    }
+
+    fn asked(&mut self, at: i64, what: &str, text: &str) {
+        let body = serde_json::json!({ "outcome": "confirmed" });
+        self.kept(Kind::Command, Some("pump 1"), at, what, text, Some(body));
+    }
+
+    fn changed(&mut self, at: i64, from: &str, to: &str, by: &str) {
+        let body = serde_json::json!({ "from": from, "to": to, "cause": { "by": by, "commander": "bert" } });
+        self.event(at, "state_changed", &format!("state changed: {from} to {to}"), Some(body));
     }
 
     fn stops(&mut self, at: i64) {
@@ -294,6 +332,138 @@ impl Written {
 }
 
 #[test]
+fn a_motor_that_another_master_starts_is_not_answered_with_the_setpoint_of_before() {
+    for seconds in [4, 40, 330] {
+        let mut night = Written::begin(&format!("other-start-{seconds}"));
+        let at = 400_000;
+        night.asked(at - 1_000 * seconds, "setpoint", "setpoint 20.00 Hz by anna from http: confirmed");
+        night.changed(at + 800, "ready", "running", "drive");
+        night.event(at + 800, "control_returned", "control returned", None);
+        let story = night.told(at);
+        assert_eq!(story.about.as_ref().unwrap().text, "state changed: ready to running");
+        let seen = story.why(Certainty::Seen);
+        assert!(seen.contains("nobody here asked for it") && !seen.contains("asked for here"), "{story:?}");
+        assert!(story.why(Certainty::NotKnown).contains("another master"), "{story:?}");
+        assert!(story.course().contains("ready to running"), "{story:?}");
+    }
+}
+
+#[test]
+fn the_moment_that_is_asked_for_is_answered_and_not_the_heaviest_of_the_minutes_around() {
+    let night = |name: &str| {
+        let mut night = Written::begin(name);
+        night.heard_for(900);
+        night.event(260_000, "tripped", "tripped: 16 OHF: drive overheating", None);
+        night.changed(270_000, "fault", "ready", "drive");
+        night.event(
+            270_000,
+            "fault_cleared",
+            "fault cleared",
+            Some(serde_json::json!({ "cause": { "by": "drive" } })),
+        );
+        night.asked(302_100, "setpoint", "setpoint 12.00 Hz by bert from http: confirmed");
+        night.asked(350_500, "stop", "ramp stop by bert from http: confirmed");
+        night.changed(350_700, "running", "stopping", "command");
+        night
+    };
+    let setpoint = night("asked-setpoint").told(302_000);
+    assert!(setpoint.about.as_ref().unwrap().text.starts_with("setpoint 12.00 Hz by bert"), "{setpoint:?}");
+    let seen = setpoint.why(Certainty::Seen);
+    assert!(seen.contains("before it, 42.1 s away: tripped: 16 OHF"), "{setpoint:?}");
+    let stop = night("asked-stop").told(350_000);
+    assert!(stop.why(Certainty::Seen).contains("bert asked for it"), "{stop:?}");
+    let cleared = night("asked-cleared").told(269_500);
+    assert_eq!(cleared.about.as_ref().unwrap().text, "fault cleared");
+    assert!(cleared.why(Certainty::Seen).contains("nobody here asked for it"), "{cleared:?}");
+    // Nothing happened then.
+    let quiet = night("asked-quiet").told(325_000);
+    assert_eq!(quiet.about, None, "{quiet:?}");
+    let seen = quiet.why(Certainty::Seen);
+    assert!(seen.contains("next before it, 22.9 s away: setpoint 12.00 Hz"), "{quiet:?}");
+    assert!(seen.contains("next after it, 25.5 s away: ramp stop by bert"), "{quiet:?}");
+    // A whole minute means that minute.
+    assert!(night("asked-minute").told(240_000).about.is_some_and(|about| about.text.starts_with("tripped")));
+}
+
+#[test]
+fn two_that_were_found_tripped_did_not_trip_together_as_far_as_anybody_knows() {
+    let mut night = Written::begin("found-together");
+    let body = || fault(false, true).map(|body| serde_json::from_str(&body).unwrap());
+    night.event(300_000, "tripped", "tripped, found so", body());
+    night.kept(Kind::Event, Some("pump 2"), 300_100, "tripped", "tripped, found so", body());
+    let story = night.told(300_000);
+    assert_eq!(story.why(Certainty::Likely), "", "{story:?}");
+    let open = story.why(Certainty::NotKnown);
+    assert!(
+        open.contains("pump 2 was found tripped too: whether at the same time is not known"),
+        "{story:?}"
+    );
+}
+
+#[test]
+fn what_was_read_before_a_kill_and_is_lost_is_not_told_as_never_read() {
+    let mut night = Written::begin("kill-words");
+    night.event(200_000, "connected", "connected: running", None);
+    night.killed_until(300_000);
+    night.event(301_000, "connected", "connected: running", None);
+    let story = night.told(250_500);
+    assert_eq!(story.about, None, "{story:?}");
+    let open: Vec<&str> = story.not_known.iter().map(|one| &*one.text).collect();
+    assert!(open.iter().any(|text| text.contains("up to a minute may be missing")), "{open:?}");
+    assert!(!open.iter().any(|text| text.contains("nothing was read")), "{open:?}");
+}
+
+#[test]
+fn a_stop_and_a_trip_within_one_poll_have_no_order_unless_the_drive_was_seen_between_them() {
+    let mut night = Written::begin("one-poll");
+    night.asked(299_850, "stop", "ramp stop by bert from http: confirmed");
+    night.event(300_000, "tripped", "tripped: 0 OC: overcurrent", None);
+    let story = night.told(299_500);
+    assert!(!story.why(Certainty::Seen).contains("shortly before"), "{story:?}");
+    assert!(story.why(Certainty::NotKnown).contains("at about the same time"), "{story:?}");
+    let mut seen = Written::begin("two-polls");
+    seen.asked(299_100, "stop", "ramp stop by bert from http: confirmed");
+    seen.changed(299_500, "running", "stopping", "command");
+    seen.event(300_000, "tripped", "tripped: 18 ObF: DC bus overvoltage", None);
+    let story = seen.told(299_500);
+    assert!(
+        story.why(Certainty::Seen).contains("shortly before it somebody had asked: ramp stop"),
+        "{story:?}"
+    );
+}
+
+#[test]
+fn a_drive_that_falls_silent_seconds_later_did_not_fall_silent_with_it() {
+    let mut night = Written::begin("silent-later");
+    let lost = || Some(serde_json::json!({ "silent_for_ms": 1_400 }));
+    night.event(300_000, "lost", "lost for 1.4 s: no answer", lost());
+    night.kept(Kind::Event, Some("pump 2"), 305_900, "lost", "lost for 1.4 s: no answer", lost());
+    let story = night.told(299_000);
+    assert!(story.about.as_ref().unwrap().text.starts_with("lost"), "{story:?}");
+    assert!(!story.why(Certainty::Seen).contains("fell silent with it"), "{story:?}");
+    assert_eq!(story.why(Certainty::Likely), "", "{story:?}");
+}
+
+#[test]
+fn a_line_on_which_nothing_is_heard_is_not_told_as_a_port_that_is_away() {
+    for (detail, is_away) in
+        [("nothing was heard for 8.0 s, whoever was asked", false), ("there is no serial port", true)]
+    {
+        let mut night = Written::begin(&format!("away-{is_away}"));
+        night.event(300_000, "lost", "lost for 1.4 s: no answer", None);
+        let body = serde_json::json!({ "kind": "line_away", "detail": detail });
+        let text = format!("the port of the line is away, none of its drives can be reached: {detail}");
+        night.kept(Kind::Alarm, None, 301_000, "unacknowledged", &text, Some(body));
+        let story = night.told(299_000);
+        assert_eq!(
+            story.why(Certainty::Seen).contains("the port of the line was away"),
+            is_away,
+            "{story:?}"
+        );
+    }
+}
+
+#[test]
 fn that_nobody_asked_is_told_only_where_nothing_is_missing() {
     let is_sure = |story: &Story| story.why(Certainty::Seen).contains("nobody here asked for it");
     let is_open = |story: &Story| {
@@ -306,7 +476,7 @@ fn that_nobody_asked_is_told_only_where_nothing_is_missing() {
 
     let mut hole = Written::begin("hole");
     let lost = crate::write::inbox::Lost { values: 0, records: 3 };
-    let batch = crate::write::inbox::Batch { lost, ..crate::write::inbox::Batch::default() };
+    let batch = Batch { lost, ..Batch::default() };
     hole.archive.take(batch, on_wall(295_000));
     hole.stops(300_000);
     hole.archive.write_records(&mut hole.store.connection, on_wall(301_000)).unwrap();
@@ -317,7 +487,7 @@ fn that_nobody_asked_is_told_only_where_nothing_is_missing() {
     // Readings that were not kept hide no command.
     let mut readings = Written::begin("readings");
     let lost = crate::write::inbox::Lost { values: 3, records: 0 };
-    let batch = crate::write::inbox::Batch { lost, ..crate::write::inbox::Batch::default() };
+    let batch = Batch { lost, ..Batch::default() };
     readings.archive.take(batch, on_wall(295_000));
     readings.stops(300_000);
     readings.archive.write_records(&mut readings.store.connection, on_wall(301_000)).unwrap();

@@ -189,3 +189,14 @@ fn records_are_told_onward_or_the_newest_first_and_only_those_that_are_meant() {
     assert_eq!(told(&tripped), ["tripped", "tripped"]);
     assert_eq!(told(&RecordsAsked { only_alarms: true, ..asked }), ["lost"]);
 }
+
+#[test]
+fn a_drive_of_which_no_value_is_written_yet_is_there_by_what_happened_to_it() {
+    let folder = Folder::new("history-first-minute");
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    let mut archive = Archive::begin(moment(0));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    archive.record(event(moment(6_000), "pump", "tripped"));
+    archive.write_records(&mut store.connection, moment(6_500)).unwrap();
+    assert_eq!(crate::read::drives(&store.connection).unwrap(), ["pump"]);
+}
