@@ -11,8 +11,8 @@ pub(crate) const LOCAL_REFERENCE: Refusal = Refusal::Overridden {
     remedy: "give the reference back at the panel, or set n02 = 5, save it, and switch the drive off and on",
 };
 pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
-    by: "another reference than that of 0002h (0023h shows it)",
-    remedy: "give the setpoint again, and see to the inputs that choose a speed (n06 to n08)",
+    by: "another reference than the one that was given (0023h shows it)",
+    remedy: "see who else writes 0002h and which inputs choose a speed (n06 to n08), then give the setpoint again",
 };
 pub(crate) const OTHER_WORD: Refusal = Refusal::Overridden {
     by: "another command word in 0001h than was written",

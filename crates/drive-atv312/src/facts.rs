@@ -8,6 +8,12 @@ pub(crate) const OTHER_REFERENCE: Refusal = Refusal::Overridden {
     remedy: "see which inputs and channels are in use (Fr1, Fr2, rFC, SA2, SA3, PS2 to PS16, JOG, PIF)",
 };
 
+/// What decides where the drive says that the reference lies beyond its limits (ETA bit 11, BBV51701 p. 21).
+pub(crate) const BEYOND_LIMIT: Refusal = Refusal::Overridden {
+    by: "a limit of the drive (ETA bit 11: LFRD is below LSP or above HSP)",
+    remedy: "see LSP and HSP at the drive, then give a setpoint between them",
+};
+
 /// An analog input below this does not change a reference by a count: 20 mV of 10 V, and 20 µA of 20 mA.
 pub(crate) const SILENT: u16 = 20;
 /// `SA2`, `SA3`: AI1 to AI3.

@@ -8,7 +8,7 @@ use drive_drivecom::Followed;
 
 use crate::{
     Atv312,
-    facts::{ANALOG_INPUTS, Facts, OTHER_REFERENCE},
+    facts::{ANALOG_INPUTS, BEYOND_LIMIT, Facts, OTHER_REFERENCE},
     reading::{FastWords, Resolution},
     registers::{ADC, AI1C, CMI, FRH, IOLR, LFR, LFRD, LRS3, RFR, SLL, TTO},
     words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, ExtendedStatus3},
@@ -160,7 +160,10 @@ impl<P: Port> Atv312<P> {
             Followed::AnotherMasters => Told::No(WRITTEN_BY_ANOTHER),
             Followed::Elsewhere => {
                 let named = settings.overrides(&self.facts, self.proof.held().unwrap_or(0));
-                Told::No(named.unwrap_or(OTHER_REFERENCE))
+                let is_beyond =
+                    words.state_words().eta.contains(crate::words::StatusWord::REFERENCE_EXCEEDED);
+                let unnamed = if is_beyond { BEYOND_LIMIT } else { OTHER_REFERENCE };
+                Told::No(named.unwrap_or(unnamed))
             }
         }
     }

@@ -161,6 +161,8 @@ export const SENTENCES_FR = {
   'FA20 bit 12 works only with FA00 bit 15, the command priority: open the drive with Authority::Priority': 'FA20 bit 12 n’agit qu’avec FA00 bit 15, la priorité de commande : ouvrir le variateur avec Authority::Priority',
 
   // Altivar 28 and 58.
+  'a limit of the drive (ETA bit 11: LFRD is below LSP or above HSP)': 'une limite du variateur (ETA bit 11 : LFRD est sous LSP ou au-dessus de HSP)',
+  'see LSP and HSP at the drive, then give a setpoint between them': 'voir LSP et HSP au variateur, puis donner une consigne entre elles',
   'another reference (FrH is not the reference of the bus)': 'une autre référence (FrH n’est pas la référence du bus)',
   'see which inputs are in use: preset speeds (SP2 to SP7), jog, summing inputs, the PI regulator': 'voir quelles entrées servent : vitesses présélectionnées (SP2 à SP7), pas à pas, entrées sommatrices, régulateur PI',
   'a run command of the terminals (LI1 or LI2)': 'un ordre de marche du bornier (LI1 ou LI2)',
@@ -228,8 +230,8 @@ export const SENTENCES_FR = {
   'give the command back at the panel, or set n02 = 5, save it, and switch the drive off and on': 'rendre la commande à la console, ou régler n02 = 5, enregistrer, puis couper et remettre le variateur sous tension',
   'the panel or the terminals (reference, bit 9 of 002Ch)': 'la console ou le bornier (référence, bit 9 de 002Ch)',
   'give the reference back at the panel, or set n02 = 5, save it, and switch the drive off and on': 'rendre la référence à la console, ou régler n02 = 5, enregistrer, puis couper et remettre le variateur sous tension',
-  'another reference than that of 0002h (0023h shows it)': 'une autre référence que celle de 0002h (0023h la montre)',
-  'give the setpoint again, and see to the inputs that choose a speed (n06 to n08)': 'redonner la consigne et vérifier les entrées qui choisissent une vitesse (n06 à n08)',
+  'another reference than the one that was given (0023h shows it)': 'une autre référence que celle qui a été donnée (0023h la montre)',
+  'see who else writes 0002h and which inputs choose a speed (n06 to n08), then give the setpoint again': 'voir qui d’autre écrit 0002h et quelles entrées choisissent une vitesse (n06 à n08), puis redonner la consigne',
   'another command word in 0001h than was written': 'un autre mot de commande dans 0001h que celui écrit',
   'something that keeps the output off (bit 8 of 002Ch)': 'quelque chose qui maintient la sortie coupée (bit 8 de 002Ch)',
   'see to the inputs (n06 to n08) and to the panel\'s STOP key': 'vérifier les entrées (n06 à n08) et la touche STOP de la console',
