@@ -115,7 +115,15 @@ impl From<StoreError> for Stopped {
 
 /// A moment that somebody has said, in milliseconds since 1970; an hour that comes twice is told.
 pub(crate) fn moment_of(text: &str) -> Result<i64, Failure> {
-    let said = moment::said(text, &Local::now()).map_err(|error| Failure::Input(error.to_string()))?;
+    let now = Local::now();
+    let said = moment::said(text, &now).map_err(|error| Failure::Input(error.to_string()))?;
+    let is_time_alone = text.trim().chars().all(|one| one.is_ascii_digit() || matches!(one, ':' | '.'));
+    if is_time_alone && day(&said.at) != day(&now) {
+        output::complain(format_args!(
+            "{text} is still to come today: yesterday, {}, is meant",
+            day(&said.at)
+        ));
+    }
     if let Some(again) = said.again {
         output::complain(format_args!(
             "{text} was twice: {} is meant; for the second write {}",
@@ -130,6 +138,11 @@ pub(crate) fn moment_of(text: &str) -> Result<i64, Failure> {
 pub(crate) fn said(unix_ms: i64) -> String {
     local(unix_ms)
         .map_or_else(|| unix_ms.to_string(), |time| time.format("%Y-%m-%d %H:%M:%S%.3f").to_string())
+}
+
+/// The day of a moment.
+fn day(at: &DateTime<Local>) -> String {
+    at.format("%Y-%m-%d").to_string()
 }
 
 pub(crate) fn offset(unix_ms: i64) -> String {

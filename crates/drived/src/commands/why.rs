@@ -42,7 +42,7 @@ fn tell(story: &Story, at: i64) -> Result<(), Failure> {
             output::say(format_args!("{}, {} ({}): {}", story.drive, said(time), offset(time), about.text))?;
         }
         None => output::say(format_args!(
-            "{}, {} ({}): nothing happened to it that is recorded",
+            "{}, {} ({}): nothing is recorded of it at that moment",
             story.drive,
             said(at),
             offset(at)
