@@ -277,6 +277,7 @@ fn said(frame: &str, now: Moment, alarms: &mut Alarms) -> Option<Record> {
     match name {
         "event" => {
             let told: Told = serde_json::from_str(data).ok()?;
+            let told = Told { text: lasting(told.text), ..told };
             let at = Moment { wall_ms: told.time_unix_ms, ..now };
             let kind = if told.drive.is_some() { Kind::Event } else { Kind::Notice };
             let Told { event, drive, alarm, text, .. } = told;
@@ -284,6 +285,7 @@ fn said(frame: &str, now: Moment, alarms: &mut Alarms) -> Option<Record> {
         }
         "alarm" => {
             let told: ToldAlarm = serde_json::from_str(data).ok()?;
+            let told = ToldAlarm { text: lasting(told.text), ..told };
             if !alarms.is_new(&told) {
                 return None;
             }
@@ -308,6 +310,14 @@ fn said(frame: &str, now: Moment, alarms: &mut Alarms) -> Option<Record> {
         }
         _ => None,
     }
+}
+
+/// What is worth keeping of a text: not when a line asks a silent drive next, which is another time in each.
+fn lasting(mut text: String) -> String {
+    if let Some(at) = text.rfind(", next probe in ").filter(|at| !text[at + 1..].contains([',', ':'])) {
+        text.truncate(at);
+    }
+    text
 }
 
 /// A command in a sentence: what, by whom, from where, and what became of it.
@@ -417,6 +427,23 @@ mod tests {
         };
         assert_eq!(told("unacknowledged"), "no drive answers");
         assert_eq!(told("over"), "over: no drive answers");
+    }
+
+    #[test]
+    fn an_alarm_whose_line_will_ask_its_drive_at_another_time_is_no_other_alarm() {
+        let now = Moment { steady_ms: 0, wall_ms: 0 };
+        let mut alarms = Alarms::default();
+        let mut told = |time: &str| {
+            let text = format!(
+                "lost while it was running, the motor may turn: the slave is off-line, next probe in {time}"
+            );
+            let data = serde_json::json!({ "id": 7, "count": 1, "state": "unacknowledged", "drive": "pump", "text": text });
+            said(&format!("id: 1\nevent: alarm\ndata: {data}\n\n"), now, &mut alarms)
+                .map(|record| record.text)
+        };
+        let text = "lost while it was running, the motor may turn: the slave is off-line";
+        assert_eq!(told("539.8ms").as_deref(), Some(text));
+        assert_eq!(told("1.2s"), None);
     }
 
     #[test]
