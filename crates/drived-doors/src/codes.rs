@@ -11,8 +11,8 @@ use std::{
 
 use tokio::time::Instant;
 
-use super::tokens::TokenError;
-use drived_config::{kept::sha256, rights::Role};
+use super::tokens::{Right, TokenError};
+use drived_config::kept::sha256;
 
 /// How long a code is good.
 pub(super) const LASTS: Duration = Duration::from_secs(10 * 60);
@@ -28,8 +28,7 @@ const LENGTH: usize = 24;
 pub(super) struct Grant {
     /// The name of a token.
     pub(super) name: String,
-    /// What it may and for how many days, if there is none of this name when the code is used.
-    pub(super) new: Option<(Role, u32)>,
+    pub(super) right: Right,
 }
 
 /// The codes by their hashes. Cheap to clone; the time is an argument.
@@ -64,6 +63,11 @@ impl Codes {
         (ends > now).then_some(grant)
     }
 
+    /// Whoever has no right to a name any more, or another one, has none by the codes of before either.
+    pub(super) fn drop_of(&self, name: &str) {
+        self.lock().retain(|_, (grant, _)| grant.name != name);
+    }
+
     fn lock(&self) -> MutexGuard<'_, BTreeMap<String, (Grant, Instant)>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -72,11 +76,12 @@ impl Codes {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use drived_config::rights::Role;
 
     #[test]
     fn a_code_is_good_once_and_for_ten_minutes() {
         let (codes, now) = (Codes::default(), Instant::now());
-        let grant = || Grant { name: "anna".to_owned(), new: Some((Role::Engineer, 1)) };
+        let grant = || Grant { name: "anna".to_owned(), right: Right::New(Role::Engineer, 1) };
         let code = codes.make(grant(), now).unwrap();
         assert_eq!(code.len(), 24);
         assert!(code.bytes().all(|letter| LETTERS.contains(&letter)));

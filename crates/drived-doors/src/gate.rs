@@ -323,7 +323,7 @@ impl Gate {
         }
         if path == LINKS {
             let body = if peer.address().is_none() { read(BODY).await? } else { Bytes::new() };
-            return self.link_for(peer, &caller, &body);
+            return self.link_for(peer, &caller, &body).await;
         }
         if caller.rights == Rights::NONE {
             return Err(Refusal::unauthorized("a token is needed"));
@@ -404,6 +404,9 @@ impl Gate {
             return Err(Refusal::new(StatusCode::NOT_FOUND, "this daemon keeps no tokens"));
         };
         let answer = token_desk::answer(Arc::clone(tokens), &self.audit, caller, what, body).await;
+        if let (&(&Method::PUT | &Method::DELETE), Some(name)) = (&what.0, what.1) {
+            self.codes.drop_of(name);
+        }
         self.changes.send_replace(());
         answer
     }
@@ -521,23 +524,32 @@ impl Gate {
 
     /// The token of whom a code is for, and its hash. The code is none from then on.
     async fn by_code(&self, code: &str, caller: &Caller) -> Result<Option<(Token, String)>, Refusal> {
-        let Some(Grant { name, new }) = self.codes.take(code, Instant::now()) else { return Ok(None) };
+        let Some(Grant { name, right }) = self.codes.take(code, Instant::now()) else { return Ok(None) };
         let Some(tokens) = self.tokens.clone() else { return Ok(None) };
-        let of = new.map(|(role, days)| (role, token_desk::of_days(days)));
-        let for_session = move || tokens.for_session(&name, of);
-        let made = tokio::task::spawn_blocking(for_session).await;
-        let made = made.unwrap_or_else(|error| Err(TokenError::Random(error.to_string())));
-        let (token, is_new) = made.map_err(unreadable)?;
+        let made = token_desk::changed(&tokens, name, move |tokens, name| {
+            // Whoever it is for may have lost his token since: then it is good no more.
+            match tokens.for_session(name, &right) {
+                Err(TokenError::Unknown { .. }) => Ok(None),
+                made => made.map(Some),
+            }
+        });
+        let Some((token, is_new)) = made.await? else { return Ok(None) };
         if is_new {
             let what = token_desk::added(&token.name, token.role, None);
-            self.audit.record(Record::new(Kind::Token, caller, what)).whenever();
+            token_desk::kept_or_removed(
+                &tokens,
+                &self.audit,
+                Record::new(Kind::Token, caller, what),
+                &token.name,
+            )
+            .await?;
         }
         let hash = token.sha256.clone();
         Ok(Some((token, hash)))
     }
 
     /// Makes a link for whoever has every right without one.
-    fn link_for(&self, peer: Peer, caller: &Caller, body: &[u8]) -> Result<Response, Refusal> {
+    async fn link_for(&self, peer: Peer, caller: &Caller, body: &[u8]) -> Result<Response, Refusal> {
         if peer.address().is_some() || !caller.rights.engineer {
             return Err(Refusal::new(StatusCode::FORBIDDEN, "links are made over the control socket"));
         }
@@ -545,17 +557,28 @@ impl Gate {
         let Some(tokens) = &self.tokens else {
             return Err(Refusal::new(StatusCode::NOT_FOUND, "this daemon keeps no tokens"));
         };
-        let is_there = tokens.all().map_err(unreadable)?.iter().any(|token| token.name == name);
-        if !is_there && role.is_none() {
-            let why = format!("there is no token {name:?}: a role makes one when the link is used");
-            return Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, why));
+        let unusable = |why| Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, why));
+        if days == Some(0) {
+            return unusable("0 days: expected 1 or more".to_owned());
         }
-        let grant = Grant { name: name.clone(), new: role.map(|role| (role, days.unwrap_or(1))) };
+        let right = match tokens.right_of(&name, role.map(|role| (role, days.unwrap_or(1)))) {
+            Err(TokenError::Unknown { .. }) => {
+                let why = format!(
+                    "there is no token {name:?} that is good: a role makes one when the link is used"
+                );
+                return unusable(why);
+            }
+            right => right.map_err(token_desk::refused)?,
+        };
+        let grant = Grant { name: name.clone(), right };
         let Some(page) = self.page.get() else {
             return Err(Refusal::new(StatusCode::NOT_FOUND, "this daemon serves no page"));
         };
+        let written = self.audit.record(Record::new(Kind::Token, caller, format!("link for {name}")));
+        if let Err(error) = written.done().await {
+            return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, error.to_string()));
+        }
         let code = self.codes.make(grant, Instant::now()).map_err(unreadable)?;
-        self.audit.record(Record::new(Kind::Token, caller, format!("link for {name}"))).whenever();
         let made = MadeLink { name, link: link(page, &code), good_for_s: codes::LASTS.as_secs() };
         let mut answer = Response::new(Body::from(line(&made)));
         answer.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));

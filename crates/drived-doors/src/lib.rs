@@ -65,15 +65,16 @@ use self::{
     host::Hosts,
     sessions::Sessions,
     tls::Tls,
-    tokens::Tokens,
+    tokens::{Right, Tokens},
 };
 pub use self::{
     network::Network,
     refusal::lacking,
     tls::{believed, identity, private, secret},
     token_desk::{
-        MadeToken, NewToken, RemovedToken, Rotation, TOKENS, TokensView, added, of_days, of_hours, replaced,
+        MadeToken, NewToken, RemovedToken, Rotation, TOKENS, TokensView, added, of_hours, replaced,
     },
+    tokens::of_days,
 };
 pub use drived_config::rights::{Caller, Rights, Role, Scope};
 use drived_words::failure::Failure;
@@ -214,7 +215,7 @@ impl Doors {
     ) -> impl Future<Output = Option<String>> + Send + use<> {
         let (mut listening, page, codes) =
             (self.listening.clone(), Arc::clone(&self.page), self.codes.clone());
-        let grant = Grant { name: name.to_owned(), new: Some((Role::Engineer, 1)) };
+        let grant = Grant { name: name.to_owned(), right: Right::New(Role::Engineer, 1) };
         let has_tokens = self.has_tokens;
         async move {
             if !has_tokens {
@@ -259,6 +260,8 @@ async fn serve_http(config: HttpConfig, tls: Option<Tls>, listens: watch::Sender
     tracing::info!("the page is at {scheme}://{address}/");
     let _ = shared.gate.page.set(match (config.allowed_hosts.first(), address.ip().is_unspecified()) {
         (Some(host), true) => format!("{scheme}://{host}:{}/", address.port()),
+        // It listens everywhere, and nobody goes there by that.
+        (None, true) => format!("{scheme}://localhost:{}/", address.port()),
         _ => format!("{scheme}://{address}/"),
     });
     listens.send_replace(true);

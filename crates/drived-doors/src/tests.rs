@@ -131,6 +131,74 @@ async fn a_link_lets_a_browser_in_once_by_the_rights_of_its_token_and_is_made_ov
     assert!(!text.contains(&code), "{text}");
 }
 
+/// A link that could never let anybody in is not made, and one that is not used takes nothing away.
+#[tokio::test]
+async fn a_link_is_no_way_round_what_was_taken_away_and_none_is_made_that_cannot_work() {
+    let rig = Rig::new("link-ends");
+    let tokens = rig.gate.tokens.clone().unwrap();
+    let links = Asked { path: "/api/v1/links", ..START };
+    let make = async |body: &str| {
+        let made = rig.ask_on_socket(&Asked { body, ..links }).await;
+        let made: serde_json::Value = serde_json::from_str(&made.body).unwrap();
+        let link = made["link"].as_str().unwrap_or_else(|| panic!("{made}"));
+        format!("{{\"code\":\"{}\"}}", link.rsplit('/').next().unwrap())
+    };
+    let login = Asked { path: "/api/v1/login", ..START };
+    rig.token("panel-1", Role::Operate);
+    for wrong in [
+        r#"{"name":"a b","role":"view"}"#,
+        r#"{"name":"local","role":"view"}"#,
+        r#"{"name":"panel-l","role":"view"}"#,
+        r#"{"name":"bob"}"#,
+        r#"{"name":"bob","role":"view","days":0}"#,
+    ] {
+        rig.ask_on_socket(&Asked { body: wrong, ..links }).await.assert_refused(422);
+    }
+    // Of a token that is removed or replaced no link is left, and none makes it anew.
+    let of_panel = Asked { path: "/api/v1/tokens/panel-1", ..START };
+    for (method, body) in [("PUT", r#"{"hours":1}"#), ("DELETE", "")] {
+        let [bare, with_role] = [r#"{"name":"panel-1"}"#, r#"{"name":"panel-1","role":"engineer"}"#];
+        let codes = [make(bare).await, make(with_role).await];
+        assert_eq!(rig.ask_on_socket(&Asked { method, body, ..of_panel }).await.status, StatusCode::OK);
+        for code in codes {
+            rig.ask(&Asked { body: &code, ..login }).await.assert_refused(401);
+        }
+    }
+    assert!(tokens.all().unwrap().is_empty(), "none was made");
+    // Nor where another program has put another in its place.
+    rig.token("panel-1", Role::View);
+    let code = make(r#"{"name":"panel-1"}"#).await;
+    tokens.remove("panel-1").unwrap();
+    rig.token("panel-1", Role::Engineer);
+    rig.ask(&Asked { body: &code, ..login }).await.assert_refused(401);
+    // Whose name came to look like another's meanwhile is told so, and a token whose time was over is still there.
+    let over = Some(Duration::ZERO);
+    tokens.remove("panel-1").unwrap();
+    tokens.add("carol", (Role::View, None), over).unwrap();
+    rig.ask_on_socket(&Asked { body: r#"{"name":"carol"}"#, ..links }).await.assert_refused(422);
+    let code = make(r#"{"name":"dora","role":"view"}"#).await;
+    rig.token("Dora", Role::View);
+    rig.ask(&Asked { body: &code, ..login }).await.assert_refused(422);
+    let code = make(r#"{"name":"carol","role":"engineer"}"#).await;
+    assert_eq!(tokens.all().unwrap().len(), 2, "making a link changes no token");
+    assert_eq!(rig.ask(&Asked { body: &code, ..login }).await.status, StatusCode::OK);
+    assert_eq!(tokens.all().unwrap().iter().filter(|token| token.name == "carol").count(), 1);
+}
+
+#[tokio::test]
+async fn no_token_is_made_by_a_link_that_nobody_could_keep_in_the_log() {
+    let rig = Rig::new("link-log");
+    let links = Asked { path: "/api/v1/links", body: r#"{"name":"anna","role":"engineer"}"#, ..START };
+    let made = rig.ask_on_socket(&links).await;
+    let made: serde_json::Value = serde_json::from_str(&made.body).unwrap();
+    let code = format!("{{\"code\":\"{}\"}}", made["link"].as_str().unwrap().rsplit('/').next().unwrap());
+    fs::remove_file(rig.folder.file("audit")).unwrap();
+    fs::create_dir(rig.folder.file("audit")).unwrap();
+    rig.ask_on_socket(&links).await.assert_refused(503);
+    rig.ask(&Asked { path: "/api/v1/login", body: &code, ..START }).await.assert_refused(503);
+    assert!(rig.gate.tokens.as_ref().unwrap().all().unwrap().is_empty());
+}
+
 #[tokio::test]
 async fn a_login_gives_a_cookie_that_no_script_reads_and_a_logout_takes_it_back() {
     let rig = Rig::new("login");

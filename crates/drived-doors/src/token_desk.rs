@@ -15,7 +15,7 @@ use tokio::task::spawn_blocking;
 use super::{
     audit::{Audit, Kind, Record},
     refusal::Refusal,
-    tokens::{Token, TokenError, TokenView, Tokens},
+    tokens::{Token, TokenError, TokenView, Tokens, of_days},
 };
 use drived_config::rights::{Caller, Role, Scope};
 use drived_words::{json::line, strict};
@@ -77,11 +77,6 @@ pub struct RemovedToken {
     pub removed: bool,
 }
 
-/// For so many days.
-pub const fn of_days(days: u32) -> Duration {
-    Duration::from_secs(days as u64 * 86_400)
-}
-
 /// For so many hours.
 pub const fn of_hours(hours: u32) -> Duration {
     Duration::from_secs(hours as u64 * 3_600)
@@ -126,11 +121,8 @@ pub(super) async fn answer(
             let rights = (role, scope.clone());
             let add = move |tokens: &Tokens, name: &str| tokens.add(name, rights, days.map(of_days));
             let token = changed(&tokens, name.clone(), add).await?;
-            let written = record(added(&name, role, scope.as_ref())).done().await;
-            if let Err(error) = written {
-                changed(&tokens, name, Tokens::remove).await?;
-                return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, error.to_string()));
-            }
+            let what = Record::new(Kind::Token, caller, added(&name, role, scope.as_ref()));
+            kept_or_removed(&tokens, audit, what, &name).await?;
             Ok(told(&MadeToken { name, role, scope, token }))
         }
         (&Method::PUT, Some(name)) => {
@@ -152,6 +144,18 @@ pub(super) async fn answer(
     }
 }
 
+/// Waits until it stands in the log of who did what that a token was made; where it cannot, the token is removed again.
+pub(super) async fn kept_or_removed(
+    tokens: &Arc<Tokens>,
+    audit: &Audit,
+    made: Record,
+    name: &str,
+) -> Result<(), Refusal> {
+    let Err(error) = audit.record(made).done().await else { return Ok(()) };
+    changed(tokens, name.to_owned(), Tokens::remove).await?;
+    Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, error.to_string()))
+}
+
 /// What is asked for, read as strictly as a command.
 pub(super) fn read<T: DeserializeOwned>(body: &[u8], expected: &str) -> Result<T, Refusal> {
     strict::body(body)
@@ -159,7 +163,7 @@ pub(super) fn read<T: DeserializeOwned>(body: &[u8], expected: &str) -> Result<T
 }
 
 /// What changes a file waits for the disk, and no task for that.
-async fn changed<T: Send + 'static>(
+pub(super) async fn changed<T: Send + 'static>(
     tokens: &Arc<Tokens>,
     name: String,
     change: impl FnOnce(&Tokens, &str) -> Result<T, TokenError> + Send + 'static,
@@ -171,7 +175,7 @@ async fn changed<T: Send + 'static>(
     }
 }
 
-fn refused(error: TokenError) -> Refusal {
+pub(super) fn refused(error: TokenError) -> Refusal {
     let status = match error {
         TokenError::Name(_) | TokenError::Reserved(_) | TokenError::Taken(_) | TokenError::Alike(..) => {
             StatusCode::UNPROCESSABLE_ENTITY

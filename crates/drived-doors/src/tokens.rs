@@ -7,19 +7,23 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use subtle::ConstantTimeEq as _;
-
 use drived_config::{
     config::look_alikes::are_alike,
     kept::{Kept, Readers, Stamp, digits, sha256},
     rights::{Role, Scope},
 };
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use subtle::ConstantTimeEq as _;
 
 /// By which a token is known as one of ours, in a file or in a log where it should not be.
 const PREFIX: &str = "drv_";
 const LONGEST_NAME: usize = 64;
+
+/// For so many days.
+pub const fn of_days(days: u32) -> Duration {
+    Duration::from_secs(days as u64 * 86_400)
+}
 
 /// Makes a token: 256 random bits behind its prefix.
 ///
@@ -72,8 +76,22 @@ impl Token {
     fn is(&self, wanted: &str, now: u64) -> bool {
         let same = |hash: &str| bool::from(hash.as_bytes().ct_eq(wanted.as_bytes()));
         let before = self.before.as_ref().map(|before| same(&before.sha256) & (now < before.until));
-        (same(&self.sha256) | before.unwrap_or_default()) & self.expires.is_none_or(|expires| now < expires)
+        (same(&self.sha256) | before.unwrap_or_default()) & self.lasts(now)
     }
+
+    /// Whether its time is not over.
+    fn lasts(&self, now: u64) -> bool {
+        self.expires.is_none_or(|expires| now < expires)
+    }
+}
+
+/// By what somebody comes in with a code.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Right {
+    /// The token of this name as it was when the code was made, by its hash: another in its place is not meant.
+    Known(String),
+    /// The token of this name; where there is none when the code is used, one that may this for so many days.
+    New(Role, u32),
 }
 
 /// A token as it is told.
@@ -200,51 +218,58 @@ impl Tokens {
         (role, scope): (Role, Option<Scope>),
         lasts: Option<Duration>,
     ) -> Result<String, TokenError> {
-        let allowed = |character: char| character.is_ascii_alphanumeric() || matches!(character, '-' | '_');
-        if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(allowed) {
-            return Err(TokenError::Name(name.to_owned()));
-        }
-        if ["local", "anonymous"].contains(&name) {
-            return Err(TokenError::Reserved(name.to_owned()));
-        }
         let _lock = self.kept.lock().map_err(|error| self.failed("written", error))?;
-        let mut tokens = self.all()?;
-        if let Some(taken) = tokens.iter().find(|token| are_alike(&token.name, name)) {
-            return Err(match taken.name == name {
-                true => TokenError::Taken(name.to_owned()),
-                false => TokenError::Alike(name.to_owned(), taken.name.clone()),
-            });
-        }
+        Ok(self.add_to(self.all()?, name, (role, scope), lasts)?.1)
+    }
+
+    /// Adds a token to these, and keeps them. Gives it with its secret.
+    fn add_to(
+        &self,
+        mut tokens: Vec<Token>,
+        name: &str,
+        (role, scope): (Role, Option<Scope>),
+        lasts: Option<Duration>,
+    ) -> Result<(Token, String), TokenError> {
+        may_be_new(&tokens, name)?;
         let secret = new_secret()?;
         let (sha256, made) = (sha256(secret.as_bytes()), now());
         let expires = lasts.map(|lasts| made.saturating_add(lasts.as_secs()));
-        tokens.push(Token { name: name.to_owned(), role, scope, sha256, made, expires, before: None });
+        let token = Token { name: name.to_owned(), role, scope, sha256, made, expires, before: None };
+        tokens.push(token.clone());
         self.write(tokens)?;
-        Ok(secret)
+        Ok((token, secret))
     }
 
-    /// The hash of the token of this name, and its role; one whose time is over is none. Where there is none it is made, of which
-    /// nobody knows the secret: it is good for sessions alone.
-    pub(super) fn for_session(
-        &self,
-        name: &str,
-        new: Option<(Role, Duration)>,
-    ) -> Result<(Token, bool), TokenError> {
-        let at = now();
-        let known = |tokens: Vec<Token>| tokens.into_iter().find(|token| token.name == name);
-        if let Some(token) = known(self.all()?) {
-            if token.expires.is_none_or(|expires| at < expires) {
-                return Ok((token, false));
+    /// The right by which a code for this name lets somebody in later: by the token that there is, else by a new one of this role.
+    ///
+    /// # Errors
+    /// It could never let anybody in: the name is none, or looks like another's, or there is no token and no role for a new one.
+    pub(super) fn right_of(&self, name: &str, new: Option<(Role, u32)>) -> Result<Right, TokenError> {
+        let (tokens, at) = (self.all()?, now());
+        match (tokens.iter().find(|token| token.name == name && token.lasts(at)), new) {
+            (Some(token), _) => Ok(Right::Known(token.sha256.clone())),
+            (None, Some((role, days))) => {
+                may_be_new(&without(tokens, name), name).map(|()| Right::New(role, days))
             }
-            self.remove(name)?;
+            (None, None) => Err(unknown(name, &tokens)),
         }
-        let Some((role, lasts)) = new else {
-            let there = self.all()?.into_iter().map(|token| token.name).collect();
-            return Err(TokenError::Unknown { name: name.to_owned(), there });
-        };
-        self.add(name, (role, None), Some(lasts))?;
-        let made = known(self.all()?);
-        made.map(|token| (token, true)).ok_or_else(|| self.failed("read", "it was removed at once"))
+    }
+
+    /// The token of this name by this right, and whether it was made for it; one whose time is over is none, and makes room for its
+    /// successor. Of one that is made nobody knows the secret: it is good for sessions alone.
+    pub(super) fn for_session(&self, name: &str, right: &Right) -> Result<(Token, bool), TokenError> {
+        let _lock = self.kept.lock().map_err(|error| self.failed("written", error))?;
+        let (tokens, at) = (self.all()?, now());
+        let known = tokens.iter().find(|token| token.name == name && token.lasts(at));
+        match (known, right) {
+            (Some(token), Right::Known(hash)) if token.sha256 == *hash => Ok((token.clone(), false)),
+            (Some(token), Right::New(..)) => Ok((token.clone(), false)),
+            (None, Right::New(role, days)) => {
+                let lasts = Some(of_days(*days));
+                self.add_to(without(tokens, name), name, (*role, None), lasts).map(|(token, _)| (token, true))
+            }
+            (_, Right::Known(_)) => Err(unknown(name, &tokens)),
+        }
     }
 
     /// Gives a token of this name another secret. That which it had is good for `overlap` yet, so that whoever uses it can be
@@ -253,8 +278,7 @@ impl Tokens {
         let _lock = self.kept.lock().map_err(|error| self.failed("written", error))?;
         let mut tokens = self.all()?;
         let Some(token) = tokens.iter_mut().find(|token| token.name == name) else {
-            let there = tokens.into_iter().map(|token| token.name).collect();
-            return Err(TokenError::Unknown { name: name.to_owned(), there });
+            return Err(unknown(name, &tokens));
         };
         let secret = new_secret()?;
         let until = now().saturating_add(overlap.as_secs());
@@ -268,13 +292,11 @@ impl Tokens {
     /// Removes a token; whoever uses it is refused from now on.
     pub fn remove(&self, name: &str) -> Result<(), TokenError> {
         let _lock = self.kept.lock().map_err(|error| self.failed("written", error))?;
-        let mut tokens = self.all()?;
-        let there: Vec<String> = tokens.iter().map(|token| token.name.clone()).collect();
-        tokens.retain(|token| token.name != name);
-        if tokens.len() == there.len() {
-            return Err(TokenError::Unknown { name: name.to_owned(), there });
+        let tokens = self.all()?;
+        match tokens.iter().any(|token| token.name == name) {
+            true => self.write(without(tokens, name)),
+            false => Err(unknown(name, &tokens)),
         }
-        self.write(tokens)
     }
 
     fn write(&self, tokens: Vec<Token>) -> Result<(), TokenError> {
@@ -286,6 +308,32 @@ impl Tokens {
     fn failed(&self, what: &'static str, reason: impl fmt::Display) -> TokenError {
         TokenError::File { file: self.file().to_owned(), what, reason: reason.to_string() }
     }
+}
+
+/// Whether a token of this name may be added to these.
+fn may_be_new(tokens: &[Token], name: &str) -> Result<(), TokenError> {
+    let allowed = |character: char| character.is_ascii_alphanumeric() || matches!(character, '-' | '_');
+    if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(allowed) {
+        return Err(TokenError::Name(name.to_owned()));
+    }
+    if ["local", "anonymous"].contains(&name) {
+        return Err(TokenError::Reserved(name.to_owned()));
+    }
+    match tokens.iter().find(|token| are_alike(&token.name, name)) {
+        Some(taken) if taken.name == name => Err(TokenError::Taken(name.to_owned())),
+        Some(taken) => Err(TokenError::Alike(name.to_owned(), taken.name.clone())),
+        None => Ok(()),
+    }
+}
+
+fn without(mut tokens: Vec<Token>, name: &str) -> Vec<Token> {
+    tokens.retain(|token| token.name != name);
+    tokens
+}
+
+fn unknown(name: &str, tokens: &[Token]) -> TokenError {
+    let there = tokens.iter().map(|token| token.name.clone()).collect();
+    TokenError::Unknown { name: name.to_owned(), there }
 }
 
 #[cfg(test)]
