@@ -45,6 +45,7 @@ export function drive(root, name) {
     el('p.state', {}, el('span.mark', { 'aria-hidden': 'true' }), state, turns), freshness);
   const remark = el('p.remark');
   const gaps = el('ul');
+  let unseenBefore = '';
   const notKnown = el('details.panel', { hidden: true }, el('summary', {}, t('not_known_of')), gaps);
   const big = BIG.map(([text]) => el('div', {}, el('dt', {}, t(text)), el('dd.number'), el('dd.since')));
   const given = big[1].appendChild(el('dd.since'));
@@ -98,7 +99,9 @@ export function drive(root, name) {
     remark.hidden = !said;
     const unseen = shown.not_known ?? [];
     notKnown.hidden = !unseen.length;
-    if (gaps.childElementCount !== unseen.length) gaps.replaceChildren(...unseen.map(one => el('li', { lang: 'en' }, told(one))));
+    const unseenNow = unseen.join('\n');
+    if (unseenNow !== unseenBefore) gaps.replaceChildren(...unseen.map(one => el('li', { lang: 'en' }, told(one))));
+    unseenBefore = unseenNow;
     BIG.forEach(([, value, of], index) => {
       const group = groupOf(of);
       setText(big[index].children[1], value(shown));

@@ -21,6 +21,8 @@ export function events(root) {
   let older = [];
   let room = SHOWN;
   let before;
+  /** What was asked of the history before another kind was chosen is not heard any more. */
+  let asks = 0;
   const count = el('p.hint', { role: 'status' });
   const kind = el('select', { 'aria-label': t('kind'), onchange: () => ask({ kind: kind.value === 'kind_all' ? '' : kind.value }, true) },
     ...Object.keys(KINDS).map(name => el('option', { value: name, selected: name === asked.kind }, t(name))));
@@ -38,7 +40,9 @@ export function events(root) {
   function ask(changes, isAnew) {
     Object.assign(asked, changes);
     if (isAnew) {
+      asks++;
       [older, before, room] = [[], undefined, SHOWN];
+      more.disabled = false;
       more.hidden = false;
       setText(said, '');
     }
@@ -60,6 +64,7 @@ export function events(root) {
 
   /** Reads until there is something of the kind that is asked for, or nothing older. */
   async function readOlder() {
+    const mine = asks;
     more.disabled = true;
     const oldest = plant.events.at(-1)?.time_unix_ms ?? daemonNow();
     const isWanted = KINDS[asked.kind || 'kind_all'];
@@ -69,15 +74,18 @@ export function events(root) {
         const wanted = new URLSearchParams({ from_unix_ms: 0, to_unix_ms: Math.floor(oldest) - 1, limit: OLDER, before: before ?? Number.MAX_SAFE_INTEGER });
         if (asked.kind === 'kind_command') wanted.set('kind', 'command');
         const { records, next_before: next } = await read(`history/records?${wanted}`);
+        if (mine !== asks) return;
         before = next;
         fresh = records.map(ofRecord);
-        older = [...older, ...fresh];
+        const numbers = new Set(older.map(({ number }) => number));
+        older = [...older, ...fresh.filter(({ number }) => !numbers.has(number))];
         more.hidden = next === undefined;
       }
       room += OLDER;
       setText(said, more.hidden ? t('journal_end') : '');
       update();
     } catch (problem) {
+      if (mine !== asks) return;
       setText(said, t('past_none', { why: problem.isUnheard ? t('not_reached') : told(problem.message) }));
     }
     more.disabled = false;

@@ -24,10 +24,19 @@ const LEAST_MS = 10_000;
 const TABLE_ROWS = 60;
 const LOOKS = [['--series-1'], ['--series-3', [7, 3]], ['--series-4', [2, 3]], ['--ink', [10, 4, 2, 4]], ['--series-2', [4, 4]], ['--focus', [1, 2]]];
 
+/** A name as an address has it; one that a person has typed is what it is. */
+function nameOf(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
+}
+
 /** Shows the long trends in `root`. */
 export function past(root) {
   const asked = { drives: '', value: '', from: '', to: '', ...Object.fromEntries(here().asked) };
-  let names = asked.drives.split(',').filter(Boolean).map(decodeURIComponent);
+  let names = asked.drives.split(',').filter(Boolean).map(nameOf);
   let to = momentsOf(asked.to)[0] ?? daemonNow();
   let from = momentsOf(asked.from)[0] ?? to - DAY;
   let answered;
@@ -115,19 +124,28 @@ export function past(root) {
     setText(then, '');
     const every = 1000 * (STEP_S.find(step => (to - from) / 1000 / step <= STEPS) ?? STEP_S.at(-1));
     const wanted = new URLSearchParams([...names.map(name => ['drive', name]), ['value', value.value], ['from_unix_ms', Math.floor(from)], ['to_unix_ms', Math.floor(to)], ['every_ms', every]]);
+    const [askedValue, askedNames, askedFrom, askedTo] = [value.value, names, from, to];
     try {
       const [answer] = await Promise.all([names.length ? read(`history/curves?${wanted}`) : { curves: [], steps: 0, from_unix_ms: from, every_ms: every }, loadPlotter()]);
       if (ended || mine !== asks) return;
-      answered = answer;
+      // It is drawn by what was asked for, whatever is chosen meanwhile.
+      answered = { ...answer, value: askedValue, names: askedNames, from: askedFrom, to: askedTo };
       tell();
       draw();
       writeTable();
     } catch (problem) {
-      if (!ended && mine === asks) setText(said, t('past_none', { why: problem.isUnheard ? t('not_reached') : told(problem.message) }));
+      if (ended || mine !== asks) return;
+      // What stands there answers another question.
+      answered = undefined;
+      plot?.destroy();
+      plot = undefined;
+      for (const part of [known, rows]) part.replaceChildren();
+      setText(said, t('past_none', { why: problem.isUnheard ? t('not_reached') : told(problem.message) }));
     }
   }
 
   function tell() {
+    const { from, to, names } = answered;
     const change = clockChange(from, to);
     const isBack = change !== undefined && zoneAt(new Date(from)) !== zoneAt(new Date(to)) && wallText(change) < wallText(change - 60_000);
     const zones = [...new Set([zoneAt(new Date(from)), zoneAt(new Date(to))])].join(', ');
@@ -144,7 +162,8 @@ export function past(root) {
   function draw() {
     if (!answered || ended) return;
     plot?.destroy();
-    const { unit, digits } = valueOf(value.value);
+    const { from, to, names } = answered;
+    const { unit, digits } = valueOf(answered.value);
     const times = Array.from({ length: answered.steps }, (_, index) => (answered.from_unix_ms + index * answered.every_ms) / 1000);
     const curves = names.map(name => answered.curves.find(curve => curve.drive === name)).filter(Boolean);
     const lines = curves.map(({ drive }, index) => {
@@ -189,6 +208,7 @@ export function past(root) {
   function tickText(unixMs) {
     const [day, time] = wallText(unixMs).split('T');
     const [, month, date] = day.split('-');
+    const { from, to } = answered;
     if (to - from > 20 * DAY) return to - from > 400 * DAY ? day.slice(0, 7) : `${date}.${month}.`;
     if (to - from > 1.5 * DAY) return `${date}.${month}. ${time}`;
     return to - from < DAY / 24 ? plainTime(unixMs) : time;
@@ -201,7 +221,7 @@ export function past(root) {
   /** The latest steps of which something is known. */
   function writeTable() {
     if (!asTable.open || !answered) return;
-    const { unit, digits } = valueOf(value.value);
+    const { unit, digits } = valueOf(answered.value);
     const lines = [];
     for (let at = answered.steps - 1; at >= 0 && lines.length < TABLE_ROWS; at--) {
       for (const { drive, least, mean, greatest, known: share } of answered.curves) {
