@@ -50,6 +50,19 @@ impl Added {
     }
 }
 
+impl Added {
+    /// Makes the file what it was; `None`: there was none.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn put_back(&self, text: Option<&str>) -> std::io::Result<()> {
+        match text {
+            Some(text) => self.write(text),
+            None => std::fs::remove_file(&self.file),
+        }
+    }
+}
+
 /// A drive that is added.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NewDrive {
@@ -85,10 +98,15 @@ pub fn with_drives(
     }
     let line = quoted(line);
     for NewDrive { drive, name, is_certain } in drives {
-        let known = if *is_certain { "By its own words." } else { "A GUESS: see its nameplate." };
+        let (known, guessed) = match is_certain {
+            true => ("By its own words.", ""),
+            false => {
+                ("A GUESS: see its nameplate, and take the mark away where it is right.", "guessed = true\n")
+            }
+        };
         let _ = write!(
             text,
-            "\n# {known}\n[[drives]]\nline = {line}\ndrive = {}\nname = {}\n# true: commands may be given to it, and its policies act.\n\
+            "\n# {known}\n[[drives]]\nline = {line}\ndrive = {}\n{guessed}name = {}\n# true: commands may be given to it, and its policies act.\n\
              control = false\n",
             quoted(&drive.to_string()),
             quoted(name)
@@ -168,6 +186,8 @@ mod tests {
         assert_eq!(drives[1]["name"].as_str(), Some("Lüfter = 2"));
         assert_eq!(drives[1]["drive"].as_str(), Some("atv312@2"));
         assert!(drives.iter().all(|drive| drive["control"].as_bool() == Some(false)));
+        let guessed = drives.iter().map(|drive| drive.get("guessed").and_then(toml::Value::as_bool));
+        assert_eq!(guessed.collect::<Vec<_>>(), [None, Some(true)], "one has said itself what it is");
     }
 
     #[test]

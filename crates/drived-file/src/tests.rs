@@ -781,8 +781,10 @@ fn drives_that_were_added_hold_as_long_as_the_configuration_has_none_of_its_own_
     // What the configuration says of all its drives is not said of these: nobody takes control of them by it.
     assert_eq!(names(&config), [("atv28@2".to_owned(), false)]);
     assert!(config.added.as_ref().is_some_and(|added| !added.is_aside));
-    let with = Config::load_with(&file, &theirs.replace("atv28@2", "atv58@3")).unwrap();
+    let other = theirs.replace("drive = \"atv28@2\"", "drive = \"atv58@3\"\nguessed = true");
+    let with = Config::load_with(&file, &other).unwrap();
     assert_eq!(names(&with), [("atv58@3".to_owned(), false)]);
+    assert!(with.lines[0].drives[0].is_guess && !config.lines[0].drives[0].is_guess);
     std::fs::write(&file, format!("{head}{own}")).unwrap();
     let config = Config::load(&file).unwrap();
     assert_eq!(names(&config), [("atv312@1".to_owned(), true)]);

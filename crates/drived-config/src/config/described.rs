@@ -25,6 +25,7 @@ impl LinePart {
             settings: DriveSettings { periods, ..DriveSettings::watched(drive.to_string()) },
             options: options.of(drive.family),
             slot: None,
+            is_guess: false,
             has_own_periods: false,
         };
         let members: Vec<Member> = drives.iter().map(member).collect();
@@ -35,6 +36,7 @@ impl LinePart {
             settings: member.settings_with(stretch),
             options: member.options,
             slot: member.slot,
+            is_guess: member.is_guess,
         };
         let drives = members.into_iter().map(part).collect();
         Self { name: name.to_owned(), config, budget, drives, problem: None }

@@ -108,6 +108,7 @@ pub(super) struct Member {
     pub(super) settings: DriveSettings,
     pub(super) options: Options,
     pub(super) slot: Option<u16>,
+    pub(super) is_guess: bool,
     /// Whether the file says how often it is asked.
     pub(super) has_own_periods: bool,
 }
@@ -122,7 +123,8 @@ impl Members {
     ) -> Result<Self, ConfigError> {
         let none = DriveEntry::default();
         let defaults = defaults.unwrap_or(&none);
-        if let Some(span) = ["line", "drive", "name", "slot"].into_iter().find_map(|key| defaults.place(key))
+        if let Some(span) =
+            ["line", "drive", "name", "guessed", "slot"].into_iter().find_map(|key| defaults.place(key))
         {
             return Err(source.error(span, "a default names no line and no drive: expected in [[drives]]"));
         }
@@ -170,7 +172,8 @@ impl Members {
                     return Err(source.error(drive.span(), problem));
                 }
                 let has_own_periods = [entry, defaults].into_iter().any(DriveEntry::has_periods);
-                group.push(Member { drive: *name, settings, options, slot, has_own_periods });
+                let is_guess = entry.guessed.as_ref().is_some_and(|said| *said.get_ref());
+                group.push(Member { drive: *name, settings, options, slot, is_guess, has_own_periods });
             }
         }
         Ok(Self(groups))
@@ -220,6 +223,7 @@ pub fn line_part(
         settings: member.settings_with(stretch),
         options: member.options.clone(),
         slot: member.slot,
+        is_guess: member.is_guess,
     };
     let drives = group.iter().map(part).collect();
     let line = LinePart { name: name.to_owned(), config, budget, drives, problem: None };

@@ -53,6 +53,8 @@ pub struct DrivePart {
     pub options: Options,
     /// Its number, where the file says it.
     pub slot: Option<u16>,
+    /// Whether its family is a guess.
+    pub is_guess: bool,
 }
 
 impl LinePart {

@@ -31,6 +31,7 @@ impl Here {
                 name: drive.settings.name.clone(),
                 line: line_name.clone(),
                 drive: drive.name.to_string(),
+                guessed: drive.is_guess,
                 control: drive.settings.control,
             };
             line.drives.iter().map(view).collect::<Vec<_>>()

@@ -167,6 +167,9 @@ pub struct AddedView {
     pub line: String,
     /// Family and address: `atv312@1`.
     pub drive: String,
+    /// Whether its family is a guess: the drive has not said so itself, and nobody has said yet that its nameplate does.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub guessed: bool,
     /// Whether commands are taken for it.
     pub control: bool,
 }

@@ -145,7 +145,7 @@ impl Plant {
                 caller: caller.name.clone(),
                 scope: caller.scope.is_some().then(|| self.commanded_by(caller)),
                 names_revision: self.0.names.get().and_then(Names::revision),
-                names_problem: self.0.names.get().and_then(Names::problem),
+                names_problem: self.names_problem(),
             },
             lines: self.lines(),
             drives: self.drives(),
@@ -208,6 +208,11 @@ impl Plant {
             Some(names) => names.name_of(kind, id),
             None => Some(id.to_owned()),
         }
+    }
+
+    /// Why nobody can say for certain who is known by an id; `None`: everybody has the one that he had.
+    pub fn names_problem(&self) -> Option<String> {
+        self.0.names.get().and_then(Names::problem)
     }
 
     /// A drive of a line as it is told.

@@ -125,9 +125,11 @@ function writeFrame() {
   setAttribute(place('connection'), 'data-connection', connection);
   setClass(document.body, 'silent', isOld);
   const banner = place('banner');
-  banner.hidden = !['silent', 'away', 'refused'].includes(connection);
-  setText(banner, connection === 'silent' ? t('banner_silent', { time: clock(plant.heardUnixMs) })
-    : connection === 'away' ? t('banner_away') : connection === 'refused' ? t('refused') : '');
+  const why = connection === 'silent' ? t('banner_silent', { time: clock(plant.heardUnixMs) })
+    : connection === 'away' ? t('banner_away') : connection === 'refused' ? t('refused')
+      : daemon.names_problem ? t('banner_names', { why: told(daemon.names_problem) }) : '';
+  banner.hidden = !why;
+  setText(banner, why);
   setText(place('login'), t(isKnown() ? 'log_out' : 'log_in'));
   const { name, argument } = here();
   writeDemo(place('demo'), name === 'drive' ? argument : undefined);

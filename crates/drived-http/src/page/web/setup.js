@@ -15,6 +15,7 @@ import { told } from './told.js';
 addTexts(SETUP_TEXTS);
 
 const LOOK_MS = 400;
+const AGAIN_MS = 2_000;
 
 /** Shows how drives are added in `root`. */
 export function setup(root) {
@@ -22,6 +23,7 @@ export function setup(root) {
   let ended = false;
   let timer;
   let may;
+  let isUnheard = false;
   const where = el('p.hint');
   const closed = el('p.remark', { hidden: true });
   const said = el('p.said', { role: 'alert' });
@@ -39,7 +41,11 @@ export function setup(root) {
   look();
   return {
     update(names) {
-      if (names.has('state')) write();
+      if (names.has('state')) {
+        write();
+        // Somebody else's reload may have changed who takes commands.
+        look();
+      }
       added.update();
     },
     tick: added.tick,
@@ -53,8 +59,15 @@ export function setup(root) {
     clearTimeout(timer);
     try {
       take(await read('setup'));
+      if (isUnheard) setText(said, '');
+      isUnheard = false;
     } catch (problem) {
-      if (!ended) setText(said, problem.isUnheard ? t('not_reached') : told(problem.message));
+      if (ended) return;
+      isUnheard = true;
+      setText(said, problem.isUnheard ? t('not_reached') : told(problem.message));
+      // A poll that is lost is no end of the scan.
+      clearTimeout(timer);
+      timer = setTimeout(look, AGAIN_MS);
     }
   }
 
@@ -78,7 +91,7 @@ export function setup(root) {
     port.update(known);
     progress.update(known.scan);
     found.update(known);
-    added.show(known.drives, may);
+    added.show(known, may);
   }
 
   function scan(wanted) {

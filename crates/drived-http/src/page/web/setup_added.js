@@ -13,11 +13,14 @@ import { frequencyText, stateWord } from './words.js';
 /** The panel of the added drives; `change(drive, control)` has commands taken for one, or not. */
 export function addedPanel(change) {
   const rows = new Map();
+  let file = '';
   const list = el('div.added');
   const element = el('section.panel.setup', { hidden: true, 'aria-label': t('setup_here') }, el('h2', {}, t('setup_here')), list);
   return { element, show, update, tick: update };
 
-  function show(drives, may) {
+  function show(view, may) {
+    const { drives } = view;
+    file = view.file ?? '';
     element.hidden = !drives.length;
     const names = drives.map(({ name }) => name);
     for (const name of [...rows.keys()]) if (!names.includes(name)) rows.delete(name);
@@ -35,6 +38,7 @@ export function addedPanel(change) {
 
   function makeRow(name) {
     let isControlled = false;
+    let guessed;
     const state = el('b');
     const note = el('small');
     const frequency = el('span.number');
@@ -48,7 +52,9 @@ export function addedPanel(change) {
 
     function show(one, may) {
       isControlled = one.control;
-      setText(takes, t(one.control ? 'setup_controlled' : 'setup_look'));
+      guessed = one.guessed ? one.drive.split('@')[0] : undefined;
+      const is = t(one.control ? 'setup_controlled' : 'setup_look');
+      setText(takes, guessed ? `${is} · ${t('setup_guessed', { family: guessed })}` : is);
       setText(button, t(one.control ? 'setup_give' : 'setup_control'));
       setAttribute(button, 'aria-label', t(one.control ? 'setup_give_of' : 'setup_control_of', { drive: name }));
       button.hidden = !may;
@@ -56,7 +62,8 @@ export function addedPanel(change) {
 
     function update() {
       const drive = plant.drives.get(name);
-      if (!drive) return;
+      // Nothing of what it showed last stands for what it does now.
+      if (!drive) return void blank();
       const known = quality(drive.status);
       const ms = age(drive.status, drive);
       const worst = trouble(drive);
@@ -68,11 +75,19 @@ export function addedPanel(change) {
       setText(fresh, known === 'good' ? t('live') : ms === undefined ? MISSING : old(ms));
     }
 
+    function blank() {
+      for (const attribute of ['data-state', 'data-quality']) setAttribute(element, attribute, undefined);
+      setText(state, t('setup_gone'));
+      for (const part of [note, frequency, fresh]) setText(part, '');
+    }
+
     async function press() {
       const to = !isControlled;
       const unseen = plant.drives.get(name)?.not_known ?? [];
-      const gaps = to && unseen.length ? el('div', {}, el('p', {}, t('not_known_of')), el('ul.history', {}, ...unseen.map(one => el('li', { lang: 'en' }, told(one))))) : undefined;
-      if (!await confirmed([name], t(to ? 'setup_confirm_control' : 'setup_confirm_give', { drive: name }), button.textContent, gaps)) return;
+      const doubts = to ? [guessed && el('p.remark', {}, t('setup_confirm_guess', { family: guessed, file })),
+        ...(unseen.length ? [el('p', {}, t('not_known_of')), el('ul.history', {}, ...unseen.map(one => el('li', { lang: 'en' }, told(one))))] : [])].filter(Boolean) : [];
+      const shown = doubts.length ? el('div', {}, ...doubts) : undefined;
+      if (!await confirmed([name], t(to ? 'setup_confirm_control' : 'setup_confirm_give', { drive: name }), button.textContent, shown)) return;
       button.disabled = true;
       await change(name, to);
       button.disabled = false;

@@ -28,18 +28,20 @@ export function foundPanel(take) {
     form.hidden = !found.length;
     const now = JSON.stringify([scan?.line, found.map(one => [one.line, one.address, one.text])]);
     watch.disabled = !isOver;
+    const line = mostOf(found);
+    // The line that was added comes with the state, which may be later than the answer; another line is called anew.
+    const there = [...plant.lines.values()].find(one => one.port === line)?.name;
+    const isAnother = form.dataset.line !== (line ?? '');
+    if (there ?? isAnother) lineName.value = there ?? usualLine(line ?? '');
+    lineName.disabled = there !== undefined;
+    form.dataset.line = line ?? '';
     if (now === shown) return;
     const before = new Map(rows.map(row => [row.key, row]));
     shown = now;
-    const line = mostOf(found);
     rows = found.map(one => before.get(keyOf(one)) ?? makeRow(one, families, one.line === line));
     list.replaceChildren(...rows.map(row => row.element));
     two.hidden = found.every(one => one.line === line);
     setText(two, t('setup_two_lines', { line: line ?? '' }));
-    const there = [...plant.lines.values()].find(one => one.port === line)?.name;
-    lineName.value = there ?? (lineName.value || usualLine(line ?? ''));
-    lineName.disabled = there !== undefined;
-    form.dataset.line = line ?? '';
     write();
   }
 
@@ -83,7 +85,6 @@ export function foundPanel(take) {
       drives: chosen.map(row => ({ address: row.address, family: row.family.value, name: row.name.value })) });
     watch.disabled = false;
     if (!changes) return;
-    lineName.value = '';
     setText(said, t('setup_added', { names: chosen.map(row => row.name.value).join(', ') }));
   }
 }

@@ -3,6 +3,7 @@
 export const SETUP_TEXTS = {
   enter: ['This browser is made known', 'Ce navigateur se fait connaître'],
   enter_now: ['One moment…', 'Un instant…'],
+  enter_again: ['Try again', 'Réessayer'],
   enter_none: ['There is no code in this address.', 'Cette adresse ne contient pas de code.'],
   enter_wrong: ['This link is not good any more: each is good once, and for ten minutes. Another is made on the host by: drived token link NAME --role engineer', 'Ce lien n’est plus valable : chacun ne l’est qu’une fois, pendant dix minutes. Sur l’hôte, drived token link NOM --role engineer en fait un autre.'],
   setup_view: ['Find and add drives', 'Trouver et ajouter des variateurs'],
@@ -60,6 +61,9 @@ export const SETUP_TEXTS = {
   setup_controlled: ['Takes commands', 'Accepte des ordres'],
   setup_control: ['Take control', 'Prendre la commande'],
   setup_control_of: ['Take control of {drive}', 'Prendre la commande de {drive}'],
+  setup_guessed: ['taken for {family}: it has not said so itself', 'tenu pour {family} : il ne l’a pas dit lui-même'],
+  setup_confirm_guess: ['It is taken for {family}, and has not said so itself. If it is another, a start, a stop or a setpoint means something else to it. Compare its nameplate first; where it is right, take guessed = true away in {file}.', 'Il est tenu pour {family} et ne l’a pas dit lui-même. S’il est autre chose, un démarrage, un arrêt ou une consigne veut dire autre chose pour lui. Comparez d’abord sa plaque ; si elle est juste, retirez guessed = true dans {file}.'],
+  setup_gone: ['not there any more', 'n’est plus là'],
   setup_give: ['Only read it again', 'Ne plus que le lire'],
   setup_give_of: ['Only read {drive} again', 'Ne plus que lire {drive}'],
   setup_confirm_control: ['{drive}: take commands for it? Nothing is started, stopped or written by this. From then on whoever may operate can start its motor here, and when drived ends it stops a motor that it has started.', '{drive} : accepter des ordres ? Rien n’est démarré, arrêté ni écrit par cela. Ensuite, qui a le droit d’exploiter peut démarrer son moteur ici, et drived arrête en fin de service un moteur qu’il a démarré.'],

@@ -18,6 +18,7 @@ const TABLE = {
   away: ['daemon not reachable', 'service injoignable'],
   refused: ['log in to see the drives', 'identifiez-vous pour voir les variateurs'],
   banner_silent: ['No news from the daemon since {time}. Everything below is old.', 'Aucune nouvelle du service depuis {time}. Tout ce qui suit est ancien.'],
+  banner_names: ['Which drive has which number is not known, and commands that come by one are refused: {why}', 'On ne sait plus quel variateur a quel numéro ; les ordres donnés par numéro sont refusés : {why}'],
   banner_away: ['The daemon cannot be reached. It is tried again.', 'Le service est injoignable. Nouvel essai en cours.'],
   old: ['{age} old', 'il y a {age}'],
   named: ['{name}: {value}', '{name} : {value}'],
