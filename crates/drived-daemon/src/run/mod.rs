@@ -15,14 +15,14 @@ mod runs;
 mod setup;
 mod watchdogs;
 
-use std::{collections::HashMap, io::IsTerminal as _, path::PathBuf, sync::Arc, time::Duration};
+use std::{collections::HashMap, io::IsTerminal as _, path::PathBuf, pin::pin, sync::Arc, time::Duration};
 
 use drive_bus::Line;
 use drive_families::Options;
 use drive_fleet::{Fleet, FleetBuilder, Left};
 use drived_words::closing;
 use futures_util::future::OptionFuture;
-use tokio::sync::mpsc;
+use tokio::{sync::mpsc, time::timeout};
 
 use self::{
     faces::Faces,
@@ -64,6 +64,8 @@ use drived_words::{
 
 /// How long the disk has for the last records of the audit log.
 const AUDITED_WITHIN: Duration = Duration::from_secs(2);
+/// So soon a page has its address, unless somebody else has it.
+const LINKED_WITHIN: Duration = Duration::from_secs(3);
 
 /// Watch and command the drives of a configuration
 ///
@@ -221,12 +223,25 @@ pub async fn run(args: Args) -> Result<(), Failure> {
 /// is told a link by which his browser has them too. What is read by others, such as a journal, never has one.
 async fn tell_beginning(file: PathBuf, link: Option<impl Future<Output = Option<String>>>) {
     let file = file.display();
-    match OptionFuture::from(link).await.flatten() {
-        Some(link) => tracing::warn!("no drive yet. Find them in a browser, within ten minutes: {link}"),
-        None => tracing::warn!(
+    let in_words = || {
+        tracing::warn!(
             "no drive yet: find them at the page, as drived token link NAME --role engineer lets a browser in, or by drived scan --line \
              PORT,19200,8E1 --save {file}, then drived reload"
-        ),
+        );
+    };
+    let mut link = pin!(OptionFuture::from(link));
+    // An address that is taken is tried again and again: whoever waits for the page learns meanwhile what else he can do.
+    let (link, is_told) = match timeout(LINKED_WITHIN, &mut link).await {
+        Ok(link) => (link, false),
+        Err(_) => {
+            in_words();
+            (link.await, true)
+        }
+    };
+    match link.flatten() {
+        Some(link) => tracing::warn!("no drive yet. Find them in a browser, within ten minutes: {link}"),
+        None if is_told => {}
+        None => in_words(),
     }
 }
 

@@ -110,6 +110,7 @@ impl Reloader {
         // Those who leave are gone and those who come are not there yet: no name means another drive than it is meant to.
         config.groups = std::mem::take(&mut new.groups);
         plant.set_groups(config.groups.clone());
+        let names_problem = plant.names_problem();
         // Who comes has his identity when he is there.
         super::tell_names(&self.0.names, &new.lines, &config.groups);
         // Nobody asks for a drive that is not there yet.
@@ -124,7 +125,7 @@ impl Reloader {
         self.0.faces.exchange(&closed, openings).await;
         config.faces = std::mem::take(&mut new.faces);
         config.added = new.added.take();
-        if !changes.is_empty() {
+        if !changes.is_empty() || plant.names_problem() != names_problem {
             plant.revisions().begin_anew();
         }
         let made = made.map_err(|error| (error.to_string(), halves(&changes)));
@@ -146,7 +147,7 @@ impl Reloader {
     }
 
     /// Whether this daemon has something to end at a drive: a run of its own, or a stop.
-    pub(super) fn is_answered_for(&self, drive: &str) -> bool {
+    fn is_answered_for(&self, drive: &str) -> bool {
         let Some(drive) = self.0.plant.fleet().drive(drive) else { return false };
         let now = drive.snapshot();
         now.lease.is_some()
@@ -156,7 +157,8 @@ impl Reloader {
     }
 
     /// Changes what was added at the page, and has it hold by the way of every reload: `change` makes the new text of the old one.
-    /// The whole is read and checked before anything is written. Only `ends` may end by it, and is begun anew: who is only read from then on.
+    /// The whole is read and checked before anything is written, and whoever asks for one change brings no other about. Only `ends` may
+    /// end by it, and is begun anew: who is only read from then on.
     ///
     /// # Errors
     /// [`Failure::Input`]: nothing is written and nothing has changed. Others as of [`Self::reload`].
@@ -173,13 +175,28 @@ impl Reloader {
             if let Some(closed) = here::closed(there.added.as_ref()) {
                 return Err(Failure::Input(here::why(closed, &file)));
             }
-            let before = there.added.and_then(|added| added.text);
+            let before = there.added.as_ref().and_then(|added| added.text.clone());
             let new = Config::load_with(&file, &change(before.as_deref())?)?;
-            Ok((before, new))
+            Ok((before, there, new))
         });
-        let (before, new) = read.await?;
+        let (before, there, new) = read.await?;
         no_new_doubt(&config, &new)?;
-        // Whoever adds a drive takes none away, whatever else has become of the files since they were read.
+        // Somebody else's wishes hold when he says so himself.
+        let pending = changes(&config, &there);
+        let pending = pending.iter().filter(|change| change.is_now());
+        let pending: Vec<_> = pending.map(|change| change.would_be(&self.0.plant.fleet())).collect();
+        if !pending.is_empty() {
+            return Err(Failure::Input(format!(
+                "the files say more than what holds ({}), and it would come to hold with this: drived reload first",
+                pending.join("; ")
+            )));
+        }
+        if let Some(drive) = ends.as_ref().filter(|drive| self.is_answered_for(drive)) {
+            return Err(Failure::Input(format!(
+                "{drive} has a run command of this daemon, or a stop that is not confirmed: it could not be stopped from here any more. Stop it first"
+            )));
+        }
+        // Whoever adds a drive takes none away, whatever has become of the files between the two readings.
         let all = changes(&config, &new);
         let is_meant = |drive: &str| ends.as_deref() == Some(drive);
         let goes = |change: &&Change| {
@@ -201,12 +218,16 @@ impl Reloader {
         };
         blocking(write).await?;
         let done = self.take(&mut config, Ok(new)).await;
-        if let Err(Failure::Input(_)) = &done {
-            // What does not hold is not found there by the next start.
-            let back = move || added.write(before.as_deref().unwrap_or_default());
-            let _ = tokio::task::spawn_blocking(back).await;
-        }
-        done
+        let Err(Failure::Input(why)) = done else { return done };
+        // What does not hold is not found there by the next start.
+        let put_back = move || match added.put_back(before.as_deref()) {
+            Ok(()) => Err(Failure::Input(why)),
+            Err(error) => Err(Failure::Input(format!(
+                "{why}; and {} has it still, because it cannot be written: {error}. It would hold from the next start on",
+                added.file.display()
+            ))),
+        };
+        blocking(put_back).await
     }
 
     /// Makes what was read hold, and tells everybody.

@@ -133,6 +133,21 @@ impl Desk {
     }
 }
 
+/// A thread that ends without a word leaves no scan under way, which would keep its port for good.
+struct Ending(Desk);
+
+impl Drop for Ending {
+    fn drop(&mut self) {
+        if let Some(scan) = &mut *self.0.scan()
+            && scan.is_under_way()
+        {
+            scan.given_up = None;
+            scan.view.state = ScanState::Failed;
+            scan.view.why = Some("it has ended without saying why: see the log of the daemon".to_owned());
+        }
+    }
+}
+
 impl Setup for Desk {
     async fn view(&self) -> SetupView {
         let here = self.0.reloader.holds().await;
@@ -196,7 +211,10 @@ impl Setup for Desk {
         let wanted = Wanted { line, addresses, standstill: wanted.standstill };
         // It opens its port again and again, and moves from no thread to another meanwhile.
         let (desk, runtime) = (self.clone(), Handle::current());
-        std::thread::spawn(move || runtime.block_on(desk.carry_out(wanted, given_up)));
+        std::thread::spawn(move || {
+            let _ending = Ending(desk.clone());
+            runtime.block_on(desk.carry_out(wanted, given_up));
+        });
         Ok(())
     }
 
@@ -233,11 +251,6 @@ impl Setup for Desk {
 
     async fn control(&self, wanted: ControlWanted) -> Result<Vec<String>, Failure> {
         let ControlWanted { drive, control } = wanted;
-        if !control && self.0.reloader.is_answered_for(&drive) {
-            return Err(Failure::Input(format!(
-                "{drive} has a run command of this daemon, or a stop that is not confirmed: it could not be stopped from here any more. Stop it first"
-            )));
-        }
         let ends = (!control).then(|| drive.clone());
         let change = move |text: Option<&str>| {
             text.and_then(|text| added::with_control(text, &drive, control)).ok_or_else(|| {

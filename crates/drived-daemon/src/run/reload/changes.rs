@@ -82,6 +82,11 @@ impl Change {
         }
     }
 
+    /// Whether it comes to hold by a reload.
+    pub(super) const fn is_now(&self) -> bool {
+        !matches!(self, Self::Later(_) | Self::ProfileLater(_))
+    }
+
     /// What has become of it where nothing could be added: lines and drives that had to go are gone.
     pub(super) fn half(&self) -> Option<String> {
         Some(match self {

@@ -77,27 +77,92 @@ async fn answers_as_described(reloader: Reloader) {
     }
 }
 
-#[tokio::test]
-async fn a_reload_that_fails_halfway_says_what_holds_and_goes_on_from_there() {
-    let file = std::env::temp_dir().join(format!("drived-halfway-{}.toml", std::process::id()));
-    let write = |drives: &[(&str, u8, &str)]| fs::write(&file, text(drives)).unwrap();
-    write(&[("north", 1, "one"), ("north", 2, "two"), ("south", 1, "three")]);
-    let config = Config::load_workable(&file).unwrap();
+/// A daemon of this configuration that has no face.
+fn begun(file: &std::path::Path) -> (Fleet, Reloader) {
+    let config = Config::load_to_begin(file).unwrap();
     let lines: Vec<Line> =
         config.lines.iter().map(|part| Line::start(part.config.clone()).unwrap()).collect();
     let fleet = super::super::build(&config, &lines, |_| Left::default()).start().unwrap();
     let plant = Plant::start(fleet.clone(), Vec::new(), false);
     let around = Surroundings::new(plant.clone(), Audit::default(), Names::default());
     let faces = Faces::open(Vec::new(), around);
-    let reloader = Reloader::new(
-        plant,
-        Notify::start(),
-        Names::default(),
-        faces,
-        Opened::default(),
-        file.clone(),
-        config,
-    );
+    let opened = Opened::default();
+    let reloader =
+        Reloader::new(plant, Notify::start(), Names::default(), faces, opened, file.to_owned(), config);
+    (fleet, reloader)
+}
+
+/// The drives that were added, `two` of them by a guess and under control.
+const ADDED: &str = "[lines.a]\nport = \"tcp://192.0.2.1:502\"\n[[drives]]\nline = \"a\"\ndrive = \"atv312@1\"\nname = \"one\"\n\
+    control = false\n[[drives]]\nline = \"a\"\ndrive = \"atv312@2\"\nguessed = true\nname = \"two\"\ncontrol = true\n";
+
+/// Control of a drive, as the page asks for it.
+fn wanted(drive: &str, control: bool) -> drived_http::api::setup::ControlWanted {
+    serde_json::from_value(serde_json::json!({ "drive": drive, "control": control })).unwrap()
+}
+
+#[tokio::test]
+async fn the_page_changes_what_it_was_asked_for_and_nothing_that_somebody_else_has_written() {
+    use drived_http::api::setup::Setup as _;
+    let folder = drived_config::testing::Folder::new("page-changes");
+    let (file, added) = (folder.file("drives.toml"), folder.file("added.toml"));
+    fs::write(&file, "state = \".\"\n").unwrap();
+    fs::write(&added, ADDED).unwrap();
+    let (_, reloader) = begun(&file);
+    let desk = super::super::setup::Desk::new(reloader.clone());
+    // What is a guess is one wherever control is taken.
+    let told = |drives: &[drived_http::api::setup::AddedView]| -> Vec<(String, bool, bool)> {
+        drives.iter().map(|one| (one.name.clone(), one.guessed, one.control)).collect()
+    };
+    let (one, two) = ("one".to_owned(), "two".to_owned());
+    assert_eq!(told(&desk.view().await.drives), [(one.clone(), false, false), (two.clone(), true, true)]);
+    // Somebody else writes that it is polled otherwise, and has not had it read yet.
+    let theirs = ADDED.replacen("control = false\n", "control = false\nrunning = \"200ms\"\n", 1);
+    fs::write(&added, &theirs).unwrap();
+    let drive = serde_json::json!({ "name": "b", "line": "tcp://192.0.2.2:502", "drives": [
+        { "address": 3, "family": "atv312", "name": "three" } ] });
+    let drive = serde_json::from_value(drive).unwrap();
+    let refused = [desk.control(wanted("one", true)).await, desk.add(drive).await];
+    for refused in refused {
+        let Err(Failure::Input(why)) = refused else { panic!("{refused:?}") };
+        assert!(why.contains("one has other settings") && why.contains("drived reload first"), "{why}");
+    }
+    assert_eq!(fs::read_to_string(&added).unwrap(), theirs, "nothing is written");
+    reloader.reload(false).await.unwrap();
+    desk.control(wanted("one", true)).await.unwrap();
+    assert_eq!(told(&desk.view().await.drives), [(one, false, true), (two, true, true)]);
+    // What holds from the next start on is no other's wish that would come to hold now.
+    fs::write(&file, "state = \".\"\nsnapshots = \"3s\"\n").unwrap();
+    desk.control(wanted("one", false)).await.unwrap();
+    assert_eq!(fs::read_to_string(&added).unwrap(), theirs);
+}
+
+#[tokio::test]
+async fn a_drive_with_a_stop_that_is_not_confirmed_stays_within_reach_of_the_page() {
+    use drived_http::api::setup::Setup as _;
+    let folder = drived_config::testing::Folder::new("page-reach");
+    let (file, added) = (folder.file("drives.toml"), folder.file("added.toml"));
+    fs::write(&file, "state = \".\"\n").unwrap();
+    fs::write(&added, ADDED).unwrap();
+    let (fleet, reloader) = begun(&file);
+    let desk = super::super::setup::Desk::new(reloader);
+    // Nobody answers at the port, so that no stop is confirmed.
+    let drive = fleet.drive("two").unwrap();
+    drop(drive.stop(drive_core::StopMode::Ramp));
+    drive.wait_until(|now| now.stop.is_some()).await;
+    let refused = desk.control(wanted("two", false)).await;
+    let Err(Failure::Input(why)) = refused else { panic!("{refused:?}") };
+    assert!(why.contains("Stop it first"), "{why}");
+    assert_eq!(fs::read_to_string(&added).unwrap(), ADDED, "nothing is written");
+    assert!(fleet.drive("two").unwrap().settings().control);
+}
+
+#[tokio::test]
+async fn a_reload_that_fails_halfway_says_what_holds_and_goes_on_from_there() {
+    let file = std::env::temp_dir().join(format!("drived-halfway-{}.toml", std::process::id()));
+    let write = |drives: &[(&str, u8, &str)]| fs::write(&file, text(drives)).unwrap();
+    write(&[("north", 1, "one"), ("north", 2, "two"), ("south", 1, "three")]);
+    let (fleet, reloader) = begun(&file);
     // Somebody else in the program has taken a name that the file does not know yet.
     let family = Family::ATV312;
     let stranger = DriveSettings::watched("four".to_owned());
