@@ -588,6 +588,8 @@ async fn a_shaft_is_told_at_rest_by_what_its_file_names_for_that() {
         let status = rig.until_machine("it stands", |machine| machine.shaft_frequency == 0).await;
         assert_eq!(status.motion, end);
     }
+}
+
 /// Its profile has another word for reverse than the machine: the word is taken, and acts on nothing. What turns still turns by its stop.
 #[tokio::test(start_paused = true)]
 async fn a_start_is_not_confirmed_by_a_motor_that_still_comes_down_from_a_stop_of_this_side() {
