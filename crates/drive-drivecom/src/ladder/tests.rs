@@ -94,9 +94,10 @@ impl Drivecom for Chart {
             slave: self.address(),
             exchange: drive_core::Exchange { function: 6, register: Some(8501) },
             code,
-            meaning: drive_core::ExceptionMeaning::Unknown,
+            meaning: drive_core::ExceptionMeaning::standard(code),
         });
-        if let Some(error) = refused.as_ref().filter(|_| exception != Some(ACKNOWLEDGED)) {
+        // What a drive has acknowledged (05h) it carries out.
+        if let Some(error) = refused.as_ref().filter(|_| exception != Some(5)) {
             return Err(error.clone());
         }
         let rises = word & !self.written.last().copied().unwrap_or(0) & FAULT_RESET != 0;
