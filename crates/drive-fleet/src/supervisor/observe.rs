@@ -203,7 +203,7 @@ impl Supervisor {
             Job::Start(_) => !from.is_fault() && !to.is_fault() && from.motion != Motion::Driven,
             // They end a run, and clear no fault. A motor that stands already is released by somebody else, unless it is seen at once.
             Job::Stop(_) | Job::Withdraw => {
-                (from.state.is_moving() || *is_new)
+                (!from.is_undriven() || *is_new)
                     && !from.is_fault()
                     && !to.is_fault()
                     && to.motion != Motion::Driven
