@@ -43,6 +43,9 @@ pub(super) async fn try_on_twin(profile: Profile) -> std::result::Result<(), Fai
     } else {
         let stopped = twin.drive.stop(StopMode::Ramp).await;
         twin.tell("stop", &stopped, || "it is taken at rest".to_owned())?;
+        if let Some(why) = profile.keeps_from(Level::Motion) {
+            output::say(format_args!("no more is tried: {why}"))?;
+        }
     }
     twin.end(&profile)
 }
