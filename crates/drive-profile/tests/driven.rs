@@ -642,3 +642,35 @@ async fn a_reset_whose_clearing_word_was_not_written_is_not_told_done() {
         rig.machine.received().iter().filter(|request| request.pdu[..] == [6, 0, 99, 0x04, 0xFE]).count();
     assert_eq!(rises, 1, "an edge goes out once");
 }
+
+/// Its reference comes from elsewhere; the register of the bus holds what was written all the same.
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_that_only_reads_back_is_not_confirmed_while_the_motor_runs_on_as_before() {
+    let other = "[register.ELSEWHERE]\nwhat = \"another\"\naddress = 40103\naccess = \"read_write\"\nstorage = \"ram\"\nunit = \"%\"\nscale = [100, 16384]\nsigned = true\nsource = \"oi2012 wb\"\n\n[register.HSW]\n";
+    let machine = text("siemens/v20")
+        .replacen("[register.HSW]\n", other, 1)
+        .replace("setpoint = \"HSW\"", "setpoint = \"ELSEWHERE\"")
+        .replace("register = \"HSW\"", "register = \"ELSEWHERE\"");
+    let (of, machine) =
+        (family("v20"), family_of(read(&machine).unwrap_or_else(|refusals| panic!("{refusals}"))));
+    let options = of.simulated_options();
+    let open = move |port, slave| of.open_with(port, slave, &options);
+    let twin = move || machine.machine(SetUp::ForTheBus).expect("it has a twin");
+    let mut rig = Contract::new(of.capabilities(), open, twin).rig();
+    rig.machine.written_by_another(102, 9_830).expect("30 Hz");
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.until_machine("it is at 30 Hz", |machine| machine.output_frequency > 2_990).await;
+    let error = rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect_err("it runs at 30 Hz");
+    assert!(matches!(error, Error::NotConfirmed { .. }), "{error}");
+    rig.drive.stop(StopMode::Ramp).await.expect("it stops");
+    // Where it follows, it is seen to.
+    for key in DRIVEN {
+        let mut rig = running(key).await;
+        rig.drive
+            .set_setpoint(Frequency::from_hertz(20).into())
+            .await
+            .unwrap_or_else(|error| panic!("{key}: {error}"));
+        rig.until_machine("it follows", |machine| machine.output_frequency.abs_diff(2_000) < 10).await;
+    }
+}

@@ -464,7 +464,7 @@ fn holds(output: Frequency, lowest: &mut Option<(Frequency, Instant)>) -> bool {
 }
 
 /// Whether an output is so far below another that it is no flicker of its register.
-fn has_fallen(output: Frequency, from: Option<Frequency>) -> bool {
+pub(super) fn has_fallen(output: Frequency, from: Option<Frequency>) -> bool {
     from.is_some_and(|from| {
         output.centihertz().checked_add(FALL.centihertz()).is_some_and(|least| least <= from.centihertz())
     })

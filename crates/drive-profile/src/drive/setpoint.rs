@@ -2,10 +2,12 @@
 
 use drive_core::{
     Class, Command as Order, Confirming, Control, Error, ErrorKind, Frequency, Lease, Port, Refusal, Result,
-    Setpoint, SetpointProblem, Speed, State, Status, Verdict,
+    SETTLED_WITHIN, Setpoint, SetpointProblem, Speed, State, Status, Verdict,
 };
 
-use super::{ProfileDrive, Words, reading::OTHERS};
+use tokio::time::Instant;
+
+use super::{ProfileDrive, Words, command::has_fallen, reading::OTHERS};
 use crate::{
     format::{Access, Register, Setpoint as Fact, Sign, UnitName},
     ladder::Level,
@@ -242,11 +244,16 @@ impl<P: Port> ProfileDrive<P> {
         }
     }
 
-    /// It is there where the drive shows it.
+    /// It is there where the drive shows it. Where what takes it is all that shows it, a motor that runs has to bear it out: its own word
+    /// that reads back says that it arrived, and not that it is in force.
     async fn see_setpoint(&mut self, setpoint: Setpoint, word: u16) -> Result<()> {
         let order = Order::Setpoint(setpoint);
-        let shows = self.profile.file().see.setpoint.given().is_some();
-        let mut confirming = Confirming::begin();
+        let file = self.profile.file();
+        let taken = file.setpoint.given().map(|fact| fact.get_ref().register.get_ref());
+        let seen = file.see.setpoint.given().map(crate::format::Spanned::get_ref);
+        let (shows, is_echo) = (seen.is_some(), seen == taken && !file.starts_by_setpoint());
+        let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
+        let mut first = None;
         loop {
             let (status, words) = match self.read_status(Class::Command).await {
                 Ok(read) => read,
@@ -267,13 +274,29 @@ impl<P: Port> ProfileDrive<P> {
                         == Some(word)
                 }
             };
-            if held && local.is_none() {
+            let is_borne_out = !is_echo
+                || status.state != State::Running
+                || follows(&status, first)
+                    .unwrap_or_else(|| status.at_reference == Some(true) && Instant::now() >= settled);
+            first = first.or(status.output_frequency);
+            if held && is_borne_out && local.is_none() {
                 self.agreed = self.setpoint_seen(&words);
                 return Ok(());
             }
             if !shows || !confirming.again().await {
-                return Err(self.not_confirmed(order, status, local.or((!shows).then_some(UNSEEN))));
+                let unseen = (!shows || held && !is_borne_out).then_some(UNSEEN);
+                return Err(self.not_confirmed(order, status, local.or(unseen)));
             }
         }
     }
+}
+
+/// Whether an output is at the setpoint, or was seen to go towards it; `None`: the drive does not show both.
+fn follows(status: &Status, first: Option<Frequency>) -> Option<bool> {
+    let (output, setpoint) = (status.output_frequency?, status.reference?);
+    let is_there = !has_fallen(output, Some(setpoint)) && !has_fallen(setpoint, Some(output));
+    let comes = first.is_some_and(|first| {
+        if first > setpoint { has_fallen(output, Some(first)) } else { has_fallen(first, Some(output)) }
+    });
+    Some(is_there || comes)
 }
