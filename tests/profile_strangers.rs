@@ -34,6 +34,8 @@ struct Kind {
     key: &'static str,
     script: &'static str,
     arguments: &'static [&'static str],
+    /// How long its ramps take from 0 to its nominal frequency, in seconds.
+    ramp: &'static str,
     /// What its owner says.
     options: &'static [(&'static str, &'static str)],
     /// A trip that can be reset.
@@ -49,6 +51,7 @@ const fn kind(key: &'static str, script: &'static str) -> Kind {
         key,
         script,
         arguments: &[],
+        ramp: "2",
         options: &[("commands-alone", "yes"), ("full-scale", "50Hz"), ("highest", "50Hz")],
         trip: 9,
         others: &[],
@@ -112,6 +115,39 @@ async fn what_is_said_of_a_drive_of_another_hand_is_what_its_shaft_does() {
     }
 }
 
+/// On a slow ramp, with a setpoint below the output before it, a stop does not show in the time of a command. A watchdog of these two is fed
+/// by a command word alone: a run word behind that stop would hold the motor at its setpoint for ever.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stop_that_shows_late_is_followed_by_no_run_word() {
+    let Some(python) = peers::python_with("pymodbus") else { return };
+    let mut lives = tokio::task::JoinSet::new();
+    for kind in kinds().into_iter().filter(|kind| matches!(kind.key, "v20" | "danfoss-fc")) {
+        lives.spawn(comes_down_late(python.clone(), kind));
+    }
+    while let Some(lived) = lives.join_next().await {
+        lived.unwrap_or_else(|failed| std::panic::resume_unwind(failed.into_panic()));
+    }
+}
+
+async fn comes_down_late(python: std::path::PathBuf, kind: Kind) {
+    let mut stage = Stage::begin(&python, Kind { ramp: "20", ..kind }).await;
+    stage.set_setpoint(30).await;
+    stage.start(Direction::Forward).await;
+    stage.until("15 Hz", |truth| truth.hertz > 15.0).await;
+    stage.set_setpoint(3).await;
+    let stopped = stage.drive.stop(StopMode::Ramp).await;
+    stage.note("stop", &outcome(&stopped));
+    stage.claim(stopped.is_err(), "a stop is told by an output that only follows its setpoint");
+    for _ in 0..10 {
+        let kept = stage.drive.keep_alive().await;
+        stage.note("keep-alive", &outcome(&kept));
+        stage.look_for("behind the stop", Duration::from_secs(1)).await;
+    }
+    stage.until("it stands", |truth| truth.hertz == 0.0 && !truth.running).await;
+    stage.stop().await;
+    stage.end();
+}
+
 /// The whole life of one.
 async fn life(python: std::path::PathBuf, kind: Kind) {
     let mut stage = Stage::begin(&python, kind).await;
@@ -143,7 +179,7 @@ impl Stage {
         let mut child = Command::new(python)
             .arg(peers::script("strangers").join(kind.script))
             .args(kind.arguments)
-            .args(["--tcp", "0", "--ramp", "2", "--coast", "3"])
+            .args(["--tcp", "0", "--ramp", kind.ramp, "--coast", "3"])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .kill_on_drop(true)
