@@ -12,7 +12,11 @@ use drived_plant::plant::past::{Certainty, RecordView, SentenceView as Sentence,
 use rusqlite::Connection;
 
 use self::facts::{Facts, body};
-use crate::{quantity::Quantity, read::pieces, store::StoreError};
+use crate::{
+    quantity::Quantity,
+    read::{parameters, pieces},
+    store::StoreError,
+};
 
 /// A moment that is a whole minute means that minute.
 const MINUTE_MS: i64 = 60_000;
@@ -79,7 +83,7 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
         about: about.map(|found| Sentence::of(Certainty::Seen, facts.in_words(found)).at(found.time_unix_ms)),
         why,
         before: before(connection, &facts, moment)?,
-        course: course(&facts, moment),
+        course: with_settings(connection, &facts, moment, course(&facts, moment))?,
         not_known: not_known(&facts, moment, about.is_some()),
     })
 }
@@ -286,6 +290,33 @@ fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
         course.push(Sentence::of(Certainty::Seen, text));
     }
     course
+}
+
+/// The same, with the settings of the drive that were read or written here as another value than before.
+fn with_settings(
+    connection: &Connection,
+    facts: &Facts,
+    moment: i64,
+    mut course: Vec<Sentence>,
+) -> Result<Vec<Sentence>, StoreError> {
+    let settings = parameters(connection, &facts.drive)?;
+    for (place, setting) in settings.iter().enumerate() {
+        let at = setting.first_unix_ms;
+        if !(moment - COURSE_BEFORE_MS..=moment + COURSE_AFTER_MS).contains(&at) {
+            continue;
+        }
+        let before = place.checked_sub(1).map(|before| &settings[before]);
+        let was = match before.filter(|before| before.address == setting.address) {
+            Some(before) => format!("it was {}", before.text),
+            None => "what it was before is not recorded".to_owned(),
+        };
+        let text =
+            format!("its setting {} was read, or written, as {}; {was}", setting.mnemonic, setting.text);
+        let later = |one: &Sentence| one.time_unix_ms.is_some_and(|time| time > at);
+        let place = course.iter().position(later).unwrap_or(course.len());
+        course.insert(place, Sentence::of(Certainty::Seen, text).at(at));
+    }
+    Ok(course)
 }
 
 fn sentence(facts: &Facts, found: &RecordView, with_words: bool) -> Sentence {

@@ -464,6 +464,29 @@ fn a_line_on_which_nothing_is_heard_is_not_told_as_a_port_that_is_away() {
 }
 
 #[test]
+fn a_setting_that_was_written_here_stands_beside_what_happened_then() {
+    let mut night = Written::begin("setting");
+    for (at, word, text) in [(100_000, 30, "3.0 s"), (295_000, 2, "0.2 s")] {
+        let read = drived_plant::plant::past::ParameterRead {
+            drive: "pump 1".into(),
+            address: 9002,
+            code: "dEC",
+            word,
+            text: text.to_owned(),
+        };
+        let settings = vec![crate::record::Setting { wall_ms: NIGHT_MS + at, read }];
+        night.archive.take(Batch { settings, ..Batch::default() }, on_wall(at));
+    }
+    night.event(300_000, "tripped", "tripped: 18 ObF: DC bus overvoltage", None);
+    let story = night.told(300_000);
+    let course = story.course();
+    assert!(
+        course.starts_with("its setting dEC was read, or written, as 0.2 s; it was 3.0 s\ntripped"),
+        "{course}"
+    );
+}
+
+#[test]
 fn that_nobody_asked_is_told_only_where_nothing_is_missing() {
     let is_sure = |story: &Story| story.why(Certainty::Seen).contains("nobody here asked for it");
     let is_open = |story: &Story| {
