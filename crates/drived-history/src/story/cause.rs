@@ -192,8 +192,7 @@ fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         lost.clear();
     }
     if is_found && !found_too.is_empty() {
-        let text =
-            format!("{} was found tripped too: whether at the same time is not known", names(&found_too));
+        let text = format!("found tripped too: {}; whether at the same time is not known", names(&found_too));
         said.push(Sentence::of(NotKnown, text));
     }
     // Those whose watchdog acted share the line, and what became of that is told above.

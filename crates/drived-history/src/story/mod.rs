@@ -57,9 +57,9 @@ const WEIGHT: [&str; 24] = [
     "reset",
     "release",
     "setpoint",
+    "state_changed",
     "warning",
     "control_returned",
-    "state_changed",
 ];
 /// What is heavier than anything that a person does.
 const HEAVY: usize = 12;
@@ -130,7 +130,7 @@ fn weight(found: &RecordView) -> Option<usize> {
 }
 
 /// What there is of the drive that a story can be about, with its weight and its beginning.
-fn told_of<'a>(facts: &'a Facts) -> impl Iterator<Item = (usize, i64, &'a RecordView)> {
+fn told_of(facts: &Facts) -> impl Iterator<Item = (usize, i64, &RecordView)> {
     let is_one =
         |found: &&RecordView| matches!(&*found.kind, "event" | "command") && facts.is_of_drive(found);
     facts
@@ -142,7 +142,7 @@ fn told_of<'a>(facts: &'a Facts) -> impl Iterator<Item = (usize, i64, &'a Record
 
 /// What somebody means who asks for this moment: the weightiest of what was then; else what is nearest, within seconds; else what was found
 /// when the drive was seen again, where nobody saw it then. `None`: nothing happened.
-fn about<'a>(facts: &'a Facts, asked: Asked) -> Option<&'a RecordView> {
+fn about(facts: &Facts, asked: Asked) -> Option<&RecordView> {
     let then = told_of(facts)
         .filter(|(_, begins, _)| asked.is_met_by(*begins))
         .min_by_key(|(weight, begins, found)| (*weight, asked.distance(*begins), found.number));
@@ -171,7 +171,7 @@ fn about<'a>(facts: &'a Facts, asked: Asked) -> Option<&'a RecordView> {
     then.or_else(near).or_else(unseen).or_else(soon).map(|(_, _, found)| found)
 }
 
-/// What is heavier than what is asked for, before and after it: it is told that it was, and as nothing's cause. Where nothing happened, what
+/// What is heavier than what is asked for, before and after it: and not as its cause. Where nothing happened, what
 /// was next.
 fn beside(facts: &Facts, about: Option<&RecordView>, moment: i64) -> Vec<Sentence> {
     let known = about.and_then(weight);
