@@ -23,6 +23,8 @@ pub enum Refusal {
     Late,
     #[error("the births have not been told: nobody can know what it writes")]
     NotBorn,
+    #[error("nobody can say which drive is meant: {0}")]
+    NamesLost(String),
     #[error("the daemon is about to end")]
     Closing,
     #[error(transparent)]
@@ -58,6 +60,7 @@ impl Refusal {
             Self::Retained => "retained",
             Self::Late => "late",
             Self::NotBorn => "not_born",
+            Self::NamesLost(_) => "names_lost",
             Self::Closing => "closing",
             Self::Unclear(Unclear::Ambiguous(_)) => "ambiguous",
             Self::Unclear(_) => "malformed",

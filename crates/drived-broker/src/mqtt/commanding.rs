@@ -124,6 +124,15 @@ impl Commanding {
         }
         let Some(asking) = face.topics.asked(&arrived.topic) else { return };
         let target = target(face, &asking.meant);
+        // What stands in for a lost topic may have been another's. A stop is taken at its word.
+        let is_by_name = match (&asking.meant, &target) {
+            (Meant::Drive(id), Some(Target::Drive(name))) | (Meant::Group(id), Some(Target::Group(name))) => {
+                id == name
+            }
+            _ => true,
+        };
+        let lost = || face.topics.problem().filter(|_| !is_by_name).map(Refusal::NamesLost);
+        let doubt = doubt.or_else(lost);
         let drive = match &target {
             Some(Target::Drive(name)) => Some(name.clone()),
             _ => None,

@@ -1,7 +1,7 @@
 //! A drive in parts, one for each of its topics, and which of them are news.
 
 use drive_core::Row;
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 use tokio::time::Instant;
 
 use drived_plant::plant::views::DriveView;
@@ -15,19 +15,10 @@ pub(super) const ABOUT: usize = 3;
 pub(super) const MEASUREMENTS: usize = 1;
 
 /// What of a drive is told in [`ABOUT`].
-const OF_ABOUT: [&str; 11] = [
-    "id",
-    "short_name",
-    "slot",
-    "line",
-    "slave",
-    "family",
-    "not_known",
-    "commanders",
-    "limits",
-    "identity",
-    "watchdog",
-];
+const OF_ABOUT: [&str; 10] =
+    ["id", "short_name", "slot", "line", "slave", "family", "not_known", "commanders", "limits", "identity"];
+/// The verdict on an identity, which is one of the moment: it stays with the state, which ends with the daemon.
+const VERDICT: &str = "check";
 
 /// What changes as time goes by and with each poll: it is no news by itself.
 const ALWAYS_NEW: [&str; 4] = ["age_ms", "time_unix_ms", "polls", "answered"];
@@ -52,7 +43,9 @@ pub(super) fn parts_of(view: &DriveView) -> [Value; 4] {
     fault.insert("present".to_owned(), present);
     fault.insert("quality".to_owned(), state["status"]["quality"].clone());
     let taken = OF_ABOUT.into_iter().filter_map(|key| Some((key.to_owned(), state.remove(key)?)));
-    let about: Map<String, Value> = taken.collect();
+    let mut about: Map<String, Value> = taken.collect();
+    let check = about.get_mut("identity").and_then(|identity| identity.as_object_mut()?.remove(VERDICT));
+    state.extend(check.map(|check| ("identity".to_owned(), json!({ VERDICT: check }))));
     [state, measurements, fault, about].map(|mut part| {
         part.insert("time_unix_ms".to_owned(), now.clone());
         Value::Object(part)
@@ -131,10 +124,8 @@ fn of_words(before: &Value, now: &Value, rows: &[Row]) -> News {
 
 #[cfg(test)]
 mod tests {
-    use drive_families::Family;
-    use serde_json::json;
-
     use super::*;
+    use drive_families::Family;
 
     fn rows() -> &'static [Row] {
         Family::ATV312.capabilities().rows

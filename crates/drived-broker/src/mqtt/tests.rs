@@ -129,6 +129,11 @@ async fn what_there_is_is_retained_and_expires_with_the_daemon() {
     assert_eq!((&state["name"], &state["status"]["quality"]), (&"pump 1".into(), &"good".into()));
     assert!(state["time_unix_ms"].is_u64() && state["status"]["age_ms"].is_u64(), "{state}");
     assert_eq!(bench.drive("fault")["present"], false);
+    // What is retained for good holds no verdict of the moment.
+    let about = bench.drive("about");
+    assert!(about["identity"].is_object() && about["identity"]["check"].is_null(), "{about}");
+    assert!(about["watchdog"].is_null(), "{about}");
+    assert!(state["identity"]["check"].is_string() && state["watchdog"]["check"].is_string(), "{state}");
     a_while().await;
     assert_eq!(bench.drive("measurements")["line_voltage_v"], 400.0);
     assert_eq!(bench.state("plant/north/line/north")["link"], "connected");
@@ -689,6 +694,38 @@ async fn a_drive_by_another_name_keeps_its_topics_and_its_device() {
     a_while().await;
     assert!(bench.runs(0), "{:?}", bench.answers_on("plant/north/drive/old/outcome"));
     bench.ask("drive/old/stop", "");
+    sleep(Duration::from_secs(20)).await;
+    assert!(!bench.runs(0));
+}
+
+/// Who a topic was before `names.json` was lost nobody knows: it moves no motor, and stops one.
+#[tokio::test(start_paused = true)]
+async fn a_topic_that_was_lost_starts_nobody_and_stops_whom_it_names() {
+    let folder = drived_config::testing::Folder::new("lost-topics");
+    std::fs::write(folder.file("names.json"), "{").unwrap();
+    let names = Names::in_folder(Some(&folder.file("")));
+    let there = Configured {
+        drives: vec![Named { name: "pump 1".to_owned(), place: "a 1".to_owned(), slot: None }],
+        ..Configured::default()
+    };
+    assert!(names.take_up(&there).is_err());
+    let bench = Bench::called(TestBroker::default(), TestPlant::of(1).await, config(), names).await;
+    a_while().await;
+    bench.ask("drive/pump_1/command", &start("a").to_string());
+    a_while().await;
+    let [.., answer] = &bench.answers()[..] else { panic!("it is answered") };
+    assert_eq!(
+        (&answer["outcome"], &answer["reason"]),
+        (&"refused".into(), &"names_lost".into()),
+        "{answer}"
+    );
+    assert!(answer["text"].as_str().unwrap().contains("names.json"), "{answer}");
+    assert!(!bench.runs(0));
+    let drive = bench.plant.plant.fleet().drive("pump 1").unwrap();
+    assert!(drive.start(drive_core::Direction::Forward).await.is_confirmed());
+    a_while().await;
+    assert!(bench.runs(0));
+    bench.ask("drive/pump_1/stop", "");
     sleep(Duration::from_secs(20)).await;
     assert!(!bench.runs(0));
 }

@@ -92,6 +92,11 @@ impl Topics {
         self.names.topic(kind, name)
     }
 
+    /// Why nobody can say for certain whom a topic means that is not the name itself; `None`: everybody has the one that he had.
+    pub(super) fn problem(&self) -> Option<String> {
+        self.names.problem()
+    }
+
     /// Whether something that is configured has this id.
     pub(super) fn has(&self, kind: Kind, id: &str) -> bool {
         self.names.has(kind, id)

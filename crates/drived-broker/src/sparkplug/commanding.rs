@@ -73,7 +73,9 @@ impl Commanding {
             let unborn = (!is_alive).then_some(Refusal::NotBorn);
             let undated = || Refusal::malformed("its payload has no timestamp: its age is not known");
             let undated = timestamp.is_none().then(undated);
-            let doubt = if is_retained { Some(Refusal::Retained) } else { unborn.or(undated) };
+            // What stands in for a lost id may have been another's. A stop is taken at its word.
+            let lost = || self.plant.names_problem().map(Refusal::NamesLost);
+            let doubt = if is_retained { Some(Refusal::Retained) } else { unborn.or(undated).or_else(lost) };
             let Some(device) = device.as_ref().map(|device| device.as_str().to_owned()) else {
                 self.handle_alarms(write, doubt, timestamp, arrived);
                 continue;

@@ -170,6 +170,33 @@ async fn before_the_births_a_start_is_refused_and_a_stop_is_not() {
     assert_eq!(pump["Control/LastCommand/Reason"].value, Some(Raw::String("not_born".to_owned())));
 }
 
+/// Who a device was before `names.json` was lost nobody knows.
+#[tokio::test(start_paused = true)]
+async fn a_device_whose_id_was_lost_is_not_started() {
+    let folder = drived_config::testing::Folder::new("lost-devices");
+    std::fs::write(folder.file("names.json"), "{").unwrap();
+    let names = drived_config::names::Names::in_folder(Some(&folder.file("")));
+    assert!(
+        names
+            .take_up(&drived_config::names::Configured {
+                drives: vec![drived_config::names::Named {
+                    name: "pump 1".to_owned(),
+                    place: "a 1".to_owned(),
+                    slot: None
+                }],
+                ..Default::default()
+            })
+            .is_err()
+    );
+    let bench = Bench::of(1, config("lost")).await;
+    bench.plant.plant.set_names(names);
+    bench.write("pump 1", "Control/Command", Raw::String(r#"{"id": "a", "action": "start"}"#.to_owned()));
+    sleep(Duration::from_secs(5)).await;
+    let [id, outcome, reason, text] = last(&bench);
+    assert_eq!([&*id, &*outcome, &*reason], ["a", "refused", "names_lost"]);
+    assert!(text.contains("names.json"), "{text}");
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_drive_that_is_only_read_is_not_moved_and_says_so() {
     let plant = TestPlant::with(1, DriveSettings::watched).await;
