@@ -19,8 +19,8 @@ use tokio::{
 
 use crate::{config::DoorsConfig, gate::Peer, *};
 
-/// The addresses that stop, as the API has them.
-const STOPS: [&str; 4] =
+/// The addresses that stop, as the API has them, which its crate compares.
+pub const STOPS: [&str; 4] =
     ["/api/v1/stop", "/api/v1/selected/stop", "/api/v1/drives/{name}/stop", "/api/v1/groups/{name}/stop"];
 
 /// What stands behind the doors here: it says who came, and streams without end.

@@ -224,6 +224,7 @@ pub(super) fn door_routes() -> Vec<Route> {
         LOGIN,
         "Begins a session by a token, or by a code that is good once; the answer sets its cookie",
     )
+    .or_problem(422)
     .or_problem(429)
     .or_problem(503);
     login.body = Some(SchemaGenerator::subschema_for::<LoginBody>);

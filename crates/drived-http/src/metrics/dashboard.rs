@@ -52,10 +52,10 @@ pub fn dashboard() -> Value {
             "datasource": source(),
             "enable": true,
             "iconColor": "red",
-            "expr": format!("drived_drive_fault{{{DRIVES}}} == 1"),
-            "titleFormat": "{{drive}} {{mnemonic}}",
+            "expr": of_drive(&format!("drived_drive_fault{{{DRIVES}}} == 1")),
+            "titleFormat": "{{name}} {{mnemonic}}",
             "textFormat": "fault {{code}}",
-            "tagKeys": "line,drive",
+            "tagKeys": "line,name",
             "step": "15s",
         }] },
         "panels": board.panels,
@@ -86,20 +86,20 @@ fn drives(board: &mut Board) {
             "Output frequency and setpoint",
             "hertz",
             &[
-                (format!("drived_drive_output_frequency_hertz{{{DRIVES}}}"), "{{drive}}"),
-                (format!("drived_drive_setpoint_hertz{{{DRIVES}}}"), "{{drive}} setpoint"),
+                (of_drive(&format!("drived_drive_output_frequency_hertz{{{DRIVES}}}")), "{{name}}"),
+                (of_drive(&format!("drived_drive_setpoint_hertz{{{DRIVES}}}")), "{{name}} setpoint"),
             ],
         ),
     );
     for (title, unit, metric, legend) in [
-        ("Motor current", "amp", "drived_drive_motor_current_amperes", "{{drive}}"),
-        ("Motor current by the rated one", "percentunit", "drived_drive_motor_current_ratio", "{{drive}}"),
-        ("Torque by the nominal one", "percentunit", "drived_drive_torque_ratio", "{{drive}}"),
-        ("Motor speed", "rotrpm", "drived_drive_motor_speed_rpm", "{{drive}}"),
-        ("Thermal state", "percentunit", "drived_drive_thermal_ratio", "{{drive}} {{of}}"),
-        ("DC bus voltage", "volt", "drived_drive_bus_voltage_volts", "{{drive}}"),
+        ("Motor current", "amp", "drived_drive_motor_current_amperes", "{{name}}"),
+        ("Motor current by the rated one", "percentunit", "drived_drive_motor_current_ratio", "{{name}}"),
+        ("Torque by the nominal one", "percentunit", "drived_drive_torque_ratio", "{{name}}"),
+        ("Motor speed", "rotrpm", "drived_drive_motor_speed_rpm", "{{name}}"),
+        ("Thermal state", "percentunit", "drived_drive_thermal_ratio", "{{name}} {{of}}"),
+        ("DC bus voltage", "volt", "drived_drive_bus_voltage_volts", "{{name}}"),
     ] {
-        board.put(12, 8, series(title, unit, &[(format!("{metric}{{{DRIVES}}}"), legend)]));
+        board.put(12, 8, series(title, unit, &[(of_drive(&format!("{metric}{{{DRIVES}}}")), legend)]));
     }
 }
 
@@ -117,28 +117,28 @@ fn lines(board: &mut Board) {
         (
             "Utilisation",
             "percentunit",
-            format!("rate(drived_line_busy_seconds_total{{{LINES}}}[$__rate_interval])"),
-            "{{line}}",
+            of_line(&format!("rate(drived_line_busy_seconds_total{{{LINES}}}[$__rate_interval])")),
+            "{{name}}",
         ),
         (
             "Exchanges that failed",
             "cps",
-            format!(
-                r#"sum by (line, drive, result) (rate(drived_line_exchanges_total{{{DRIVES},result!~"answered|exception"}}[$__rate_interval])) > 0"#
-            ),
-            "{{drive}} {{result}}",
+            of_drive(&format!(
+                r#"sum by (instance, line, drive, result) (rate(drived_line_exchanges_total{{{DRIVES},result!~"answered|exception"}}[$__rate_interval])) > 0"#
+            )),
+            "{{name}} {{result}}",
         ),
         (
             "Frames that answered nothing",
             "cps",
-            format!("rate(drived_line_frame_errors_total{{{LINES}}}[$__rate_interval]) > 0"),
-            "{{line}} {{kind}}",
+            of_line(&format!("rate(drived_line_frame_errors_total{{{LINES}}}[$__rate_interval]) > 0")),
+            "{{name}} {{kind}}",
         ),
         (
             "The longest way of a stop to the wire",
             "s",
-            format!("drived_line_worst_case_stop_seconds{{{LINES}}}"),
-            "{{line}}",
+            of_line(&format!("drived_line_worst_case_stop_seconds{{{LINES}}}")),
+            "{{name}}",
         ),
     ] {
         board.put(12, 8, series(title, unit, &[(query, legend)]));
@@ -191,6 +191,16 @@ fn commands(board: &mut Board) {
     ] {
         board.put(12, 8, series(title, unit, &[(query, legend)]));
     }
+}
+
+/// What drives are called now: their series have their ids, which they keep.
+fn of_drive(query: &str) -> String {
+    format!("({query}) * on (instance, line, drive) group_left (name) drived_drive_info")
+}
+
+/// The same of lines.
+fn of_line(query: &str) -> String {
+    format!("({query}) * on (instance, line) group_left (name) drived_line_info")
 }
 
 /// Panels from left to right and downwards.
@@ -322,6 +332,7 @@ fn table() -> Value {
         format!("{by}) (drived_drive_setpoint_hertz{{{DRIVES}}})"),
         format!("{by}) (drived_drive_motor_current_amperes{{{DRIVES}}})"),
         format!("{by}) (time() - drived_drive_last_answer_timestamp_seconds{{{DRIVES}}})"),
+        format!("{by}, name) (drived_drive_info{{{DRIVES}}})"),
     ];
     let targets = ('A'..).zip(&queries).map(|(letter, query)| now(letter, query));
     let units = [
@@ -369,8 +380,9 @@ fn table() -> Value {
         "transformations": [
             { "id": "merge", "options": {} },
             { "id": "organize", "options": {
-                "excludeByName": { "Time": true, "Value #A": true, "Value #B": true },
-                "renameByName": { "mnemonic": "fault" },
+                "excludeByName": { "Time": true, "Value #A": true, "Value #B": true, "Value #G": true },
+                "indexByName": { "instance": 0, "line": 1, "name": 2, "drive": 3 },
+                "renameByName": { "mnemonic": "fault", "drive": "id" },
             } },
         ],
         "options": { "showHeader": true, "sortBy": [{ "displayName": "fault", "desc": true }] },

@@ -2,10 +2,19 @@
 
 use drived_doors::{
     LINKS, Role, TOKENS,
-    testing::{Asked, Rig, START},
+    testing::{Asked, Rig, START, STOPS},
 };
 
-use crate::api::{described, testing::validate};
+use crate::api::{described, stops, testing::validate};
+
+#[test]
+fn what_the_doors_are_tested_with_stops_as_the_api_does() {
+    let sorted = |mut all: Vec<&'static str>| {
+        all.sort_unstable();
+        all
+    };
+    assert_eq!(sorted(stops()), sorted(STOPS.to_vec()));
+}
 
 #[tokio::test]
 async fn login_and_logout_are_answered_as_the_document_says() {
