@@ -404,17 +404,21 @@ impl<P: Port> Calls<'_, P> {
         if !row.access.is_readable() {
             return outcome.map(|()| written);
         }
-        let value = match outcome {
+        let value = match &outcome {
             Ok(()) => self.read_row(row).await,
             // Whether an ambiguous write arrived, the reading tells.
             Err(error) if error.kind() == ErrorKind::OutcomeUnknown => {
-                self.read_back(row.address, word, &error).await
+                self.read_back(row.address, word, error).await
             }
-            Err(error) => return Err(error),
+            Err(error) => return Err(error.clone()),
         };
         let value = value.map_err(Error::after_write)?;
         if value == word {
             return Ok(written);
+        }
+        // It is not there, and the drive has said why.
+        if let Err(error @ Error::Exception { .. }) = outcome {
+            return Err(error);
         }
         let raw = vec![RawWord { address: row.address, code: row.code, value }];
         let status = Box::new(Status { raw, ..Status::default() });

@@ -1,13 +1,13 @@
 //! What is sent next: [`next_part`], from a [`Place`] in what the history keeps. Nothing is sent twice, and nothing is left out but what is not
 //! kept any more.
 
-use rusqlite::{Connection, OptionalExtension as _, params};
+use rusqlite::{Connection, params};
 
 use super::line::Lines;
 use crate::{
     quantity::Quantity,
     read::{self, told_in},
-    store::StoreError,
+    store::{Place, StoreError},
 };
 
 /// So much time of one drive is sent at once.
@@ -18,37 +18,6 @@ const LATE_MS: i64 = 5_000;
 const TOLD_EVERY_MS: i64 = 60_000;
 /// What is passed over is told, where it is longer than this and was not kept any more.
 const SKIPPED_MS: i64 = 3_600_000;
-
-/// How far it was sent: up to a moment of one clock, and within the window behind that up to a drive.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Place {
-    pub segment: i64,
-    pub until_ms: i64,
-    /// The window that is being sent, and the last drive of it that was.
-    window: Option<(i64, String)>,
-}
-
-impl Place {
-    /// That of the file.
-    ///
-    /// # Errors
-    /// It cannot be read.
-    pub fn kept(connection: &Connection, target: &str) -> Result<Self, StoreError> {
-        let mut find = connection.prepare_cached("SELECT segment, until_ms FROM sent WHERE target = ?1")?;
-        let row =
-            |row: &rusqlite::Row<'_>| Ok(Self { segment: row.get(0)?, until_ms: row.get(1)?, window: None });
-        Ok(find
-            .query_row([target], row)
-            .optional()?
-            .unwrap_or(Self { until_ms: i64::MIN, ..Self::default() }))
-    }
-
-    /// Whether everything up to it was sent.
-    #[must_use]
-    pub const fn is_whole(&self) -> bool {
-        self.window.is_none()
-    }
-}
 
 /// Lines, and the place behind them.
 #[derive(Debug)]

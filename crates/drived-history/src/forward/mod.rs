@@ -10,12 +10,16 @@ use std::{path::PathBuf, time::Duration};
 
 use tokio::{sync::watch, time::sleep};
 
-pub use self::{batch::Place, target::Target};
+pub use self::target::Target;
 use self::{
     batch::{Part, next_part},
     post::post,
 };
-use crate::{read::History, store::StoreError, write::inbox::Inbox};
+use crate::{
+    read::History,
+    store::{Place, StoreError},
+    write::inbox::Inbox,
+};
 
 /// What is sent on, and where to.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,5 +1,6 @@
 //! The file: opened, checked, locked against a second daemon, and put aside where it is damaged.
 
+mod place;
 pub mod schema;
 
 use std::{
@@ -12,6 +13,8 @@ use std::{
 use rusqlite::{Connection, ErrorCode, OpenFlags};
 
 use drived_config::kept::Kept;
+
+pub use self::place::Place;
 
 /// What stands behind the name of the file in that of the file that says who writes it.
 const LOCK: &str = ".lock";

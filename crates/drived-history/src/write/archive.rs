@@ -14,11 +14,10 @@ use super::{
 };
 use crate::{
     chunk::Chunk,
-    forward::Place,
     quantity::Set,
     read::SOURCE_BITS,
     record::{LineMinute, Moment, Record, Setting},
-    store::StoreError,
+    store::{Place, StoreError},
 };
 
 /// Values are written after this time; a kill or a power cut loses no more.

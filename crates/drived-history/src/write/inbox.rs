@@ -7,9 +7,9 @@ use std::{
 };
 
 use crate::{
-    forward::Place,
     quantity::Set,
     record::{LineMinute, Record, Setting},
+    store::Place,
     tracker::Seen,
 };
 
