@@ -14,7 +14,7 @@ use drive_sim::Surroundings;
 use super::Untold;
 
 /// The profiles whose drives reach motion and have a simulated twin.
-const PROFILES: [&str; 4] = ["danfoss-fc", "goodrive", "ig5a", "v20"];
+const PROFILES: [&str; 5] = ["danfoss-fc", "goodrive", "ig5a", "v20", "g120"];
 
 /// Whose drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
