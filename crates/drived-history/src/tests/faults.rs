@@ -15,7 +15,7 @@ use crate::{
     store::{self, StoreError, schema},
     write::{
         Limits,
-        age::Lived,
+        age::{self, Lived},
         archive::Archive,
         inbox::{Batch, Inbox, Lost},
         tidy,
@@ -226,9 +226,10 @@ fn what_is_too_much_goes_and_what_is_finest_goes_first() {
     let ahead = Lived { wall_ms: end + 2 * Limits::default().years_ms, ..lived(211_000_000) };
     while tidy::trim(&mut store.connection, ahead, &Limits::default()).unwrap() {}
     assert_eq!((count(&store.connection, "block"), counts(&store.connection)), (blocks, before));
-    // By age: each has its turn within a day.
-    for hour in 0..24 {
-        let old = lived(210_000_000 + Limits::default().years_ms + (25 + hour) * 3_600_000);
+    // By age: each has its turn within so many marks.
+    for turn in 0..24 {
+        let past = (150 + turn) * age::MARKED_EVERY_MS;
+        let old = lived(210_000_000 + Limits::default().years_ms + past);
         while tidy::trim(&mut store.connection, old, &Limits::default()).unwrap() {}
     }
     assert_eq!((count(&store.connection, "block"), counts(&store.connection)), (0, [0, 0, 0]));

@@ -150,8 +150,8 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
         let before = look::unasked(&line);
         let heard = look::ask(&line, step.slave, self.wait).await?;
         let silent = std::mem::replace(&mut self.silent, Some(step).filter(|_| heard == Heard::Nothing));
-        let is_disturbed = self.disturbing.len() < DISTURBING && look::unasked(&line) > before;
-        self.disturbing.extend(silent.filter(|silent| is_disturbed && silent.trial == step.trial));
+        let silent = silent.filter(|silent| silent.trial == step.trial);
+        self.note_disturbing(silent, &line, before);
         let (answer, interval) = match heard {
             Heard::Nothing => return Ok(None),
             Heard::Damaged(why) => self.judged(step, Vec::new(), Some(why)).await?,
@@ -164,9 +164,18 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
             self.feeding.add(step, answer.only(), interval, self.began.elapsed());
         }
         let line = self.line(step.trial).await?;
+        // His answer may also have come while the next one was being recognised.
+        self.note_disturbing(silent, &line, before);
         let asked = line.stats().slaves.get(&step.slave.number()).map_or(0, |slave| slave.sent);
         let exchanges = u32::try_from(asked).unwrap_or(u32::MAX);
         Ok(Some(Find { step, answer, found: Found { step, exchanges, interval } }))
+    }
+
+    /// Whoever was silent may have disturbed what has been asked since, by an answer that came too late.
+    fn note_disturbing(&mut self, silent: Option<Step>, line: &Line, before: u64) {
+        let is_disturbed = self.disturbing.len() < DISTURBING && look::unasked(line) > before;
+        let silent = silent.filter(|silent| is_disturbed && !self.disturbing.contains(silent));
+        self.disturbing.extend(silent);
     }
 
     /// Reads whoever answers as each family that can be set so, and says how often he is to be fed.
