@@ -108,7 +108,7 @@ pub(crate) enum Command {
 /// Whatever is asked of a subcommand that this program was built without.
 #[cfg(not(feature = "history"))]
 #[derive(Debug, clap::Args)]
-struct NotBuiltIn {
+pub(crate) struct NotBuiltIn {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     _asked: Vec<std::ffi::OsString>,
 }
