@@ -933,7 +933,8 @@ def first_hour(page, url, link, port, keys=False):
     after = page.evaluate(read)
     assert before["status"]["state"] == after["status"]["state"] == "running", after
     assert before["counters"]["lost"] == after["counters"]["lost"], after
-    assert after["counters"]["polls"] > before["counters"]["polls"], after
+    assert after["counters"]["polls"] >= before["counters"]["polls"], after
+    until(page, f"{read}.then(drive => drive.counters.polls > {before['counters']['polls']})")
     # A drive that runs by a command of ours is not let out of reach.
     hand.press(page.locator(".added .find[data-name=pump]").get_by_role("button"))
     hand.press(page.locator("dialog button.primary"))
