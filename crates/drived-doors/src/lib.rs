@@ -25,11 +25,13 @@ mod network;
 mod pace;
 mod patient;
 mod refusal;
+mod secret;
 mod sessions;
 #[cfg(unix)]
 mod socket;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
+#[cfg_attr(not(feature = "tls"), path = "no_tls.rs")]
 mod tls;
 mod token_desk;
 pub mod tokens;
@@ -55,6 +57,8 @@ pub use self::gate::{LINKS, LOGIN, LOGOUT, LoginBody, MadeLink, NewLink, Session
 #[cfg(unix)]
 use self::socket::Unbound;
 pub use self::socket::usual_places;
+#[cfg(feature = "tls")]
+pub use self::tls::{believed, identity};
 use self::{
     audit::{Audit, Kind, Record},
     codes::{Codes, Grant},
@@ -70,7 +74,7 @@ use self::{
 pub use self::{
     network::Network,
     refusal::lacking,
-    tls::{believed, identity, private, secret},
+    secret::{private, secret},
     token_desk::{
         MadeToken, NewToken, RemovedToken, Rotation, TOKENS, TokensView, added, of_hours, replaced,
     },

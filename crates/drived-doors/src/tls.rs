@@ -13,7 +13,10 @@ use tokio_rustls::{
     server::TlsStream,
 };
 
-use super::config::TlsFiles;
+use super::{
+    config::TlsFiles,
+    secret::{of, private},
+};
 
 /// How long the two sides may take to agree.
 const AGREED_WITHIN: Duration = Duration::from_secs(5);
@@ -88,32 +91,6 @@ pub fn believed(authorities: Option<&Path>) -> Result<RootCertStore, String> {
         }
     }
     Ok(roots)
-}
-
-/// What stands in the file of a secret, without the end of its line.
-///
-/// # Errors
-///
-/// It is missing, or can be read by everybody.
-pub fn secret(file: &Path) -> Result<String, String> {
-    private(file)?;
-    let text = std::fs::read_to_string(file).map_err(|error| of(file, &error))?;
-    Ok(text.trim_end_matches(['\r', '\n']).to_owned())
-}
-
-/// Refuses a secret that everybody on this machine can read.
-pub fn private(file: &Path) -> Result<(), String> {
-    #[cfg(unix)]
-    if std::fs::metadata(file)
-        .is_ok_and(|known| std::os::unix::fs::PermissionsExt::mode(&known.permissions()) & 0o007 != 0)
-    {
-        return Err(of(file, &format_args!("everybody can read it: chmod o= {}", file.display())));
-    }
-    Ok(())
-}
-
-fn of(file: &Path, error: &dyn std::fmt::Display) -> String {
-    format!("{}: {error}", file.display())
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! Frames as somebody has taken them down: a capture of this program or of another, a log, hex in any dress, or bytes as they were.
 //! Pure: bytes in, frames out. Whatever comes, it is looked at and never trusted.
 
+mod own;
+#[cfg(feature = "captures")]
 mod packets;
 mod stream;
 mod text;
@@ -34,7 +36,7 @@ const PCAP: [[u8; 4]; 4] =
 /// Why there are none.
 pub(super) fn read(bytes: &[u8], without_check: bool) -> Result<Taken, String> {
     let taken = if bytes.starts_with(&PCAPNG) || PCAP.iter().any(|first| bytes.starts_with(first)) {
-        packets::read(bytes)?
+        own::read(bytes).map_or_else(|| of_others(bytes), Ok)?
     } else if let Ok(text) = std::str::from_utf8(bytes)
         && !text.contains('\0')
     {
@@ -46,6 +48,17 @@ pub(super) fn read(bytes: &[u8], without_check: bool) -> Result<Taken, String> {
         true => Err(taken.notes.into_iter().next().unwrap_or_else(|| NOTHING.to_owned())),
         false => Ok(taken),
     }
+}
+
+#[cfg(feature = "captures")]
+fn of_others(file: &[u8]) -> Result<Taken, String> {
+    packets::read(file)
+}
+
+#[cfg(not(feature = "captures"))]
+fn of_others(_: &[u8]) -> Result<Taken, String> {
+    Err("this program was built without the captures of others: cargo build --bin drived builds them in"
+        .to_owned())
 }
 
 const NOTHING: &str = "nothing in it looks like a frame: expected a capture (pcapng, pcap), or bytes in hexadecimal such as \

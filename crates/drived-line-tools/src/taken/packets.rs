@@ -1,11 +1,11 @@
-//! Captures: pcapng and classic pcap, of this program, of Wireshark, of tcpdump at a gateway. One that is cut off is read as far as it
+//! Captures of other programs: pcapng and classic pcap, of Wireshark, of tcpdump at a gateway. One that is cut off is read as far as it
 //! is whole.
 
 use std::{collections::BTreeMap, time::Duration};
 
 use bytes::Bytes;
 use drive_bus::{
-    capture::{self, Captured, Direction, Dissector},
+    capture::{Captured, Direction, Dissector},
     content::Content,
 };
 use etherparse::{NetSlice, SlicedPacket, TransportSlice};
@@ -13,7 +13,7 @@ use pcap_parser::{
     Block, LegacyPcapReader, Linktype, PcapBlockOwned, PcapError, PcapNGReader, traits::PcapReaderIterator,
 };
 
-use super::Taken;
+use super::{Taken, own::CUT};
 
 /// The largest packet or block that is read.
 const LARGEST: usize = 1 << 18;
@@ -26,43 +26,11 @@ const UNREAD: usize = 4_096;
 
 /// The frames of a capture.
 pub(super) fn read(file: &[u8]) -> Result<Taken, String> {
-    if let Some(ours) = ours(file) {
-        return Ok(ours);
-    }
     let mut packets = Packets::default();
     let cut =
         if file.starts_with(&super::PCAPNG) { pcapng(file, &mut packets) } else { pcap(file, &mut packets) };
     packets.finish(cut)
 }
-
-/// One that this program has written, which says what its line spoke and how late it was heard.
-fn ours(file: &[u8]) -> Option<Taken> {
-    let mut reader = capture::Reader::default();
-    reader.push(file);
-    let mut frames = Vec::new();
-    let mut notes = Vec::new();
-    loop {
-        match reader.next_frame() {
-            Ok(Some(frame)) => frames.push(frame),
-            Ok(None) => break,
-            Err(_) if frames.is_empty() => return None,
-            Err(error) => {
-                notes.push(format!("{error}: what stands before it is told"));
-                break;
-            }
-        }
-    }
-    if frames.is_empty() {
-        return None;
-    }
-    if notes.is_empty() && reader.finish().is_err() {
-        notes.push(CUT.to_owned());
-    }
-    let (dissector, late) = (reader.dissector(), reader.late());
-    Some(Taken { dissector, late, has_times: true, frames, notes })
-}
-
-const CUT: &str = "the file is cut off in the middle: what stands before that is told";
 
 /// Reads the packets of a pcapng file; says whether it is cut off.
 fn pcapng(file: &[u8], packets: &mut Packets) -> bool {

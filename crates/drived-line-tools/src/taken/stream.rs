@@ -77,6 +77,7 @@ impl Heard {
 }
 
 /// Who sent which of these whole frames, by their forms and the order in which they came.
+#[cfg(feature = "captures")]
 pub(super) fn directions(frames: &mut [Captured]) {
     let Some(mut ear) = Ear::new(&LineConfig::stream(SerialSettings::MODBUS_DEFAULT), Duration::ZERO) else {
         return;
