@@ -73,7 +73,6 @@ impl<P: Port> Drive for Drive3g3ev<P> {
     /// goes down and the bus commands; written again where a run command has come after it. The bus cannot take the command
     /// from the panel or the terminals.
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
-        self.watch.shaft.stops();
         self.stop_motor(mode).await
     }
 

@@ -100,7 +100,6 @@ impl<P: Port> Drive for Atv28<P> {
     }
 
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
-        self.proof.watch.shaft.stops();
         Ok(drivecom::stop(self, mode).await?.held_by(&self.proof.watch.shaft))
     }
 

@@ -19,9 +19,9 @@ pub enum Motion {
     Braking,
     /// It stands, and the drive holds it there by direct current.
     Held,
-    /// The output was cut while it turned, and nothing tells when it has come to rest.
+    /// The output was cut while it turned, or was found cut when it was first looked at, and nothing tells when it has come to rest.
     Coasting,
-    /// The drive brought it down to no output, or has shown no output since it was first seen, or its coast time is over. What it did
+    /// The drive brought it down to no output, or was first seen without one that is not cut, or its coast time is over. What it did
     /// between two looks, or while its line was lost, nobody saw: a motor that was at rest, and that others have run and let coast
     /// meanwhile, is told to be at rest still.
     AtRest,
@@ -89,11 +89,10 @@ pub const INJECTION_AT_MOST: Duration = Duration::from_secs(30);
 /// What was last seen of the shaft, or is to be taken for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Past {
-    /// It was never seen.
+    /// It was never seen, or was given a run command since. An output that is cut then is no standstill: many a drive shows none while
+    /// it has no supply, and behind a power cycle.
     #[default]
     Unseen,
-    /// It was not seen before a stop went out, or before a trip cut its output.
-    Stopped,
     /// It stood.
     AtRest,
     /// It was driven. Of one that was at zero in two statuses behind each other nothing is to be expected when the output goes.
@@ -208,14 +207,7 @@ impl Shaft {
     /// A motor that was seen at rest may have turned since: without an output that was seen to come down, it may coast.
     pub(crate) fn may_turn(&mut self) {
         if self.past == Past::AtRest {
-            self.past = Past::Stopped;
-        }
-    }
-
-    /// A stop goes out. What a motor did that was never seen before nobody knows: without an output behind it, it may coast.
-    pub fn stops(&mut self) {
-        if self.past == Past::Unseen {
-            self.past = Past::Stopped;
+            self.past = Past::Unseen;
         }
     }
 
@@ -231,10 +223,6 @@ impl Shaft {
         let was_lost = std::mem::take(&mut self.was_lost);
         let descent = std::mem::take(&mut self.descent);
         let is_cut = was_lost || self.was_braked() && descent.is_cut(at);
-        // A trip cuts the output, also of a motor that nobody saw turning before.
-        if shown == Output::Tripped {
-            self.stops();
-        }
         let shown = match shown {
             Output::Tripped => Output::Cut,
             Output::None if is_cut => Output::Cut,
@@ -300,7 +288,7 @@ impl Shaft {
         self.past = match self.past {
             // Whoever was driven and is without an output was not seen to be brought down: a ramp, or a cut between two looks.
             Past::Driven { still: false, .. } => Past::Coasts(at),
-            Past::Stopped | Past::Braked { still: false } if cut => Past::Coasts(at),
+            Past::Unseen | Past::Braked { still: false } if cut => Past::Coasts(at),
             coasts @ Past::Coasts(since)
                 if self.coast_time.is_none_or(|time| at.saturating_duration_since(since) < time) =>
             {
@@ -338,18 +326,14 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_motor_that_was_stopped_or_has_tripped_before_it_was_ever_seen_may_coast_where_its_output_is_cut()
-     {
+    async fn a_motor_that_was_never_seen_may_coast_where_its_output_is_cut() {
         let now = Instant::now();
-        for (shown, motion) in [(Output::Cut, Motion::Coasting), (Output::None, Motion::AtRest)] {
-            let mut shaft = Shaft::new();
-            shaft.stops();
-            assert_eq!(shaft.see(now, shown, Some(Frequency::ZERO)), motion);
-        }
-        assert_eq!(Shaft::new().see(now, Output::Tripped, Some(Frequency::ZERO)), Motion::Coasting);
+        let first = |shown| Shaft::new().see(now, shown, Some(Frequency::ZERO));
+        assert_eq!(first(Output::Cut), Motion::Coasting);
+        assert_eq!(first(Output::Tripped), Motion::Coasting);
+        assert_eq!(first(Output::None), Motion::AtRest, "a ramp has ended");
         let mut shaft = Shaft::new();
         shaft.see(now, Output::None, Some(Frequency::ZERO));
-        shaft.stops();
         assert_eq!(shaft.see(now, Output::Cut, Some(Frequency::ZERO)), Motion::AtRest, "it stood");
     }
 

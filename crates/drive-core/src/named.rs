@@ -20,11 +20,17 @@ pub fn is_name(text: &str, name: &str) -> bool {
     text.trim().bytes().map(plain).eq(name.bytes().map(plain))
 }
 
-/// Gives an enum `Display` and `FromStr` by the names of its variants.
+/// Gives an enum `ALL`, `Display` and `FromStr` by the names of its variants.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! named {
     ($type:ident { $($variant:ident => $name:literal),+ $(,)? }) => {
+        #[allow(dead_code, reason = "not each is gone through")]
+        impl $type {
+            /// All of them, in their order.
+            pub const ALL: [Self; [$($name),+].len()] = [$(Self::$variant),+];
+        }
+
         impl ::std::fmt::Display for $type {
             fn fmt(&self, f: &mut ::std::fmt::Formatter<'_>) -> ::std::fmt::Result {
                 f.pad(match self {

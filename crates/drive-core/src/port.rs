@@ -36,17 +36,13 @@ pub enum Class {
     Stop,
 }
 
-impl Class {
-    /// Every class, the most urgent first.
-    pub const ALL: [Self; 5] = [Self::Stop, Self::Command, Self::KeepAlive, Self::Status, Self::Background];
-}
-
+// The most urgent first: so they are gone through.
 crate::named! { Class {
-    Background => "background",
-    Status => "status",
-    KeepAlive => "keep-alive",
-    Command => "command",
     Stop => "stop",
+    Command => "command",
+    KeepAlive => "keep-alive",
+    Status => "status",
+    Background => "background",
 } }
 
 /// What sending a write twice would do.

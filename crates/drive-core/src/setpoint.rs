@@ -120,11 +120,6 @@ pub enum StopMode {
     DcInjection,
 }
 
-impl StopMode {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Ramp, Self::Fast, Self::Freewheel, Self::DcInjection];
-}
-
 crate::named! { StopMode {
     Ramp => "ramp",
     Fast => "fast",

@@ -27,19 +27,6 @@ pub enum State {
 }
 
 impl State {
-    /// All of them.
-    pub const ALL: [Self; 9] = [
-        Self::NotReady,
-        Self::Disabled,
-        Self::Ready,
-        Self::Running,
-        Self::Stopping,
-        Self::QuickStop,
-        Self::FaultReaction,
-        Self::Fault,
-        Self::Unknown,
-    ];
-
     /// Whether it has tripped or is about to.
     #[must_use]
     pub const fn is_fault(self) -> bool {
@@ -89,25 +76,3 @@ crate::named! { Control {
     Local => "local",
     OtherBus => "other bus",
 } }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_state_is_among_all_of_them() {
-        let next = |state: State| match state {
-            State::NotReady => Some(State::Disabled),
-            State::Disabled => Some(State::Ready),
-            State::Ready => Some(State::Running),
-            State::Running => Some(State::Stopping),
-            State::Stopping => Some(State::QuickStop),
-            State::QuickStop => Some(State::FaultReaction),
-            State::FaultReaction => Some(State::Fault),
-            State::Fault => Some(State::Unknown),
-            State::Unknown => None,
-        };
-        let all: Vec<State> = std::iter::successors(Some(State::NotReady), |state| next(*state)).collect();
-        assert_eq!(all, State::ALL);
-    }
-}

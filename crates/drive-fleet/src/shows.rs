@@ -55,22 +55,6 @@ drive_core::named! { Shows {
 } }
 
 impl Shows {
-    /// All of them.
-    pub const ALL: &'static [Self] = &[
-        Self::Connecting,
-        Self::Lost,
-        Self::StopPending,
-        Self::NotReady,
-        Self::Disabled,
-        Self::Ready,
-        Self::Running,
-        Self::Stopping,
-        Self::QuickStop,
-        Self::FaultReaction,
-        Self::Fault,
-        Self::Unknown,
-    ];
-
     /// Whether it is said by the drive's own words, and not by that they are missing.
     #[must_use]
     pub const fn is_of_the_drive(self) -> bool {

@@ -24,7 +24,7 @@ impl Snapshot {
 
     pub(crate) fn concern_of(&self, kind: ConcernKind, now: Instant) -> Option<Concern> {
         let status = self.status.as_ref();
-        let was_moving = self.started_here() || status.is_some_and(|status| !status.value.is_standstill());
+        let was_moving = self.started_here() || status.is_some_and(|status| !status.value.is_undriven());
         let heard = status.map(|status| status.at);
         let error = || self.error.as_ref().map(ToString::to_string);
         let connected = status.filter(|_| self.link == Link::Connected);

@@ -21,9 +21,9 @@ fn plant(name: &str) -> (Sim, File) {
 fn a_loss_and_a_return_are_one_line_each_with_local_time_and_no_colours() {
     let (mut sim, file) = plant("loss");
     let mut daemon = Running::start(&["run", "--config", file.path()]);
-    let mut log = daemon.log_until("connected: pump 1, pump 2 at standstill");
+    let mut log = daemon.log_until("connected: pump 1, pump 2 disabled, the shaft may coast");
     sim.say("atv312@2 cable cut", "done");
-    log += &daemon.log_until("pump 2 lost at standstill: no answer for ");
+    log += &daemon.log_until("pump 2 lost with output off: no answer for ");
     sim.say("atv312@2 cable join", "done");
     log += &daemon.log_until("pump 2 back after ");
     daemon.ask_to_end();

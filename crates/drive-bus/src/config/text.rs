@@ -179,6 +179,35 @@ impl FromStr for SerialText {
     }
 }
 
+/// In a configuration a line is its text.
+///
+/// ```
+/// # #[cfg(feature = "serde")] {
+/// use drive_bus::{LineConfig, config::LineText};
+///
+/// let said: LineText = serde_json::from_str(r#""/dev/ttyUSB0""#)?;
+/// assert_eq!(said.serial.baud, None, "it follows from the drives");
+/// let line: LineConfig = serde_json::from_str(r#""/dev/ttyUSB0,19200,8E1""#)?;
+/// assert_eq!(line.serial.baud(), 19_200);
+/// assert!(serde_json::from_str::<LineConfig>(r#""/dev/ttyUSB0,19201,8E1""#).is_err());
+/// # }
+/// # Ok::<(), serde_json::Error>(())
+/// ```
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for LineText {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        drive_core::serialize::as_text::deserialize(deserializer)
+    }
+}
+
+/// The same with speed and format said.
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for LineConfig {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        drive_core::serialize::as_text::deserialize(deserializer)
+    }
+}
+
 /// Format and protocol, as `FORMAT[,PROTOCOL[,SETTING=VALUE]...]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CharacterText {

@@ -31,6 +31,22 @@ const NETWORK: Duration = Duration::from_millis(100);
 const COLLECTED: usize = 8 + 4;
 
 /// Listens to a port, and never writes to it.
+///
+/// ```
+/// use drive_bus::{LineConfig, listen::{Listener, Role}};
+/// use drive_core::SerialSettings;
+/// # #[tokio::main(flavor = "current_thread")]
+/// # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // A master asks slave 1 for the word at 0C81h.
+/// let asked: &[u8] = &[0x01, 0x03, 0x0C, 0x81, 0x00, 0x01, 0xD7, 0x72];
+/// let line = LineConfig::stream(SerialSettings::MODBUS_DEFAULT);
+/// let mut listener = Listener::over(asked, &line)?;
+/// let heard = listener.next().await?.ok_or("the line has ended")?;
+/// assert_eq!(heard.role, Role::Request);
+/// assert!(listener.next().await?.is_none());
+/// # Ok(())
+/// # }
+/// ```
 pub struct Listener {
     stream: Pin<Box<dyn AsyncRead + Send>>,
     ear: Ear,

@@ -36,17 +36,6 @@ drive_core::named! { AlarmState {
 } }
 
 impl AlarmState {
-    /// All of them.
-    pub const ALL: &'static [Self] = &[
-        Self::Unacknowledged,
-        Self::Acknowledged,
-        Self::Returned,
-        Self::Gone,
-        Self::Shelved,
-        Self::Suppressed,
-        Self::Over,
-    ];
-
     /// Whether it waits for somebody to take note of it.
     #[must_use]
     pub const fn waits(self) -> bool {

@@ -184,7 +184,6 @@ impl<P: Port> ProfileDrive<P> {
         // the run command may stand and act when that goes away.
         let mut written = self.write_stop(action, order).await?;
         self.registers.owe_judgement();
-        self.watch.shaft.stops();
         let mut confirming = Confirming::begin();
         let mut again = Instant::now() + SETTLED_WITHIN;
         let mut first: Option<Frequency> = None;

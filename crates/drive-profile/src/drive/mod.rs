@@ -49,10 +49,6 @@ impl<P: Port> ProfileDrive<P> {
         let registers = Registers::new(port, slave, profile.capabilities(), meaning);
         let (fast, slow, code) = (profile.fast(), profile.slow(), profile.code());
         let guarded = Guarded::of(&profile);
-        let mut watch = Watch::default();
-        // What the motor did before it was first seen nobody knows: an output that is cut then is no standstill, for many a drive shows
-        // none while it has no supply, and behind a power cycle.
-        watch.shaft.stops();
         Self {
             registers,
             profile,
@@ -60,7 +56,7 @@ impl<P: Port> ProfileDrive<P> {
             slow,
             code,
             owner,
-            watch,
+            watch: Watch::default(),
             guarded,
             agreed: None,
             kept: None,

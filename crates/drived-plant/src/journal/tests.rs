@@ -171,11 +171,11 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
     eprintln!("{text}");
     // What somebody who was called at night wants to know, each once.
     for (level, parts) in [
-        (Level::INFO, &["north: connected: all 10 at standstill"][..]),
+        (Level::INFO, &["north: connected: all 10 disabled, the shaft may coast"][..]),
         (Level::INFO, &["north: identified: all 10 TELEMECANIQUE ATV312HU15N4"]),
         (Level::INFO, &["north: pump 6: start forward by operator: confirmed"]),
         // The terminal that came loose: the first at once, the others together.
-        (Level::WARN, &["pump 7 lost at standstill: no answer for 3."]),
+        (Level::WARN, &["pump 7 lost with output off: no answer for 3."]),
         (
             Level::ERROR,
             &["north: also lost, no answer for up to ", "pump 3, pump 4, pump 5, pump 6 at 30 Hz"],
@@ -189,7 +189,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
         (Level::ERROR, &["north: pump 1 tripped at 30 Hz: OCF, "]),
         // Dead for ten minutes.
         (Level::WARN, &["north: pump 7 lost while tripped: no answer for "]),
-        (Level::INFO, &["north: pump 7 back after 10 min", "at standstill"]),
+        (Level::INFO, &["north: pump 7 back after 10 min", "the shaft may coast"]),
         // The port: one line for the line and all that hangs on it, one for its return, one for what the drives did.
         (
             Level::ERROR,
@@ -197,7 +197,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
                 "line north lost: ",
                 "No such device",
                 "pump 1, pump 2 at 30 Hz",
-                "pump 8, pump 9, pump 10 at standstill",
+                "pump 8, pump 9, pump 10 with output off",
             ],
         ),
         (Level::INFO, &["line north back after "]),
@@ -258,5 +258,5 @@ async fn a_drive_that_a_reload_adds_is_told_of_by_its_line_and_name() {
     sleep_until(start + Duration::from_secs(20)).await;
     let _ = fleet.shutdown(Duration::from_secs(5)).await;
     journal.await.unwrap();
-    told.assert_once(Level::INFO, &["north: connected: pump 2 at standstill"]);
+    told.assert_once(Level::INFO, &["north: connected: pump 2 disabled, the shaft may coast"]);
 }

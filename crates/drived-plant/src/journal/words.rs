@@ -2,7 +2,7 @@
 
 use std::{fmt, sync::Arc, time::Duration};
 
-use drive_core::{Error, Fault, Frequency, PortError, State, Status};
+use drive_core::{Error, Fault, Frequency, Motion, PortError, State, Status};
 
 /// A frequency as a person says it: `30 Hz`, `29.95 Hz`.
 pub(super) struct Hertz(pub(super) Frequency);
@@ -45,6 +45,7 @@ pub(super) fn doing(status: &Status) -> String {
     match status.state {
         State::Fault | State::FaultReaction => "tripped".to_owned(),
         _ if status.is_standstill() => "at standstill".to_owned(),
+        state if status.motion == Motion::Coasting => format!("{state}, the shaft may coast"),
         State::Running => format!("running{backwards}{at}"),
         state => format!("{state}{at}"),
     }
@@ -55,6 +56,7 @@ pub(super) fn left(status: &Status) -> String {
     match status.output_frequency {
         _ if status.is_fault() => "tripped".to_owned(),
         _ if status.is_standstill() => "at standstill".to_owned(),
+        _ if status.is_undriven() => "with output off".to_owned(),
         Some(output) => format!("at {}", Hertz(output)),
         None => status.state.to_string(),
     }

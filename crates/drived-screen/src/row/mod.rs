@@ -132,7 +132,7 @@ fn state(drive: &SnapshotView, is_live: bool) -> String {
         return shows.to_string();
     }
     let status = drive.status.value.as_ref();
-    let turning = status.filter(|status| !status.is_standstill() && shows != Shows::StopPending);
+    let turning = status.filter(|status| !status.is_undriven() && shows != Shows::StopPending);
     let more = fault(drive).or_else(|| Some(direction(turning?.direction?).to_owned()));
     let text = more.map_or_else(|| shows.to_string(), |more| format!("{shows} {more}"));
     if is_live { text } else { format!("({text})") }

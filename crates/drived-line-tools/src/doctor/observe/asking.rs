@@ -271,7 +271,7 @@ impl Asking {
         self.note(asker, strays, false);
         match status {
             Ok(status) => {
-                let runs = !status.is_standstill();
+                let runs = !status.is_undriven();
                 let running = self.running.get_or_insert_default();
                 if runs {
                     running.insert(asker.slave)

@@ -55,8 +55,7 @@ impl Teller {
         snapshot: &Snapshot,
     ) {
         let status = snapshot.status.as_ref().map(|status| &*status.value);
-        let turned =
-            status.filter(|status| !status.is_standstill()).and_then(|status| status.output_frequency);
+        let turned = status.filter(|status| !status.is_undriven()).and_then(|status| status.output_frequency);
         let line = self.line_of(drive);
         let with_line =
             line_down(error).is_some() || self.lines.get(line).is_some_and(|line| line.away.is_some());
@@ -71,7 +70,7 @@ impl Teller {
             self.share(now, drive, Fate::Silent, Level::WARN, silent_for, String::new());
             return;
         };
-        let level = if status.is_standstill() { Level::WARN } else { Level::ERROR };
+        let level = if status.is_undriven() { Level::WARN } else { Level::ERROR };
         if self.together.contains_key(&(line, Fate::Lost)) {
             self.share(now, drive, Fate::Lost, level, silent_for, left(status));
         } else {
@@ -87,8 +86,7 @@ impl Teller {
             return;
         }
         let before = trip.before.as_ref().map(|before| &*before.value);
-        let turned =
-            before.filter(|before| !before.is_standstill()).and_then(|before| before.output_frequency);
+        let turned = before.filter(|before| !before.is_undriven()).and_then(|before| before.output_frequency);
         let code = trip.status.value.fault_code;
         self.hold(now + EXPLAINED, drive, What::Trip { when: When::Heard(turned), is_new: true, code });
     }
