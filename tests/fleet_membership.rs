@@ -146,6 +146,60 @@ async fn a_stop_under_way_outlives_other_settings() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_drive_that_is_called_otherwise_is_the_same_and_its_motor_notices_nothing() {
+    let mut plant = plant();
+    started(&plant, "1").await;
+    started(&plant, "2").await;
+    plant.events_so_far().await;
+    let (old, before) = (plant.drive("1"), plant.drive("1").snapshot());
+    let machine = plant.sites[0].simulated.slave(1).expect("it is there");
+    let writes = Plant::writes(&machine);
+    let settings = |name: &str| DriveSettings::controlled(name);
+    assert_eq!(plant.fleet.rename("1", settings("2")), Err(FleetError::NameTaken("2".to_owned())));
+    assert_eq!(plant.fleet.rename("9", settings("8")), Err(FleetError::NoSuchDrive("9".to_owned())));
+    let released = plant.fleet.rename("1", DriveSettings::watched("mixer"));
+    assert!(matches!(released, Err(FleetError::Setting { .. })), "its policy has to act first: {released:?}");
+    assert_eq!(plant.fleet.rename("1", settings("mixer")), Ok(()));
+    // At once, and by no other name.
+    let names: Vec<_> = plant.fleet.drives().iter().map(|drive| drive.name().to_string()).collect();
+    assert_eq!(names, ["mixer", "2"], "it keeps its place");
+    assert!(plant.fleet.drive("1").is_none() && &*plant.drive("mixer").snapshot().name == "mixer");
+    let renamed = |kind: &EventKind| matches!(kind, EventKind::Renamed(old) if &**old == "1");
+    plant.event("the new name", renamed).await;
+    sleep(20 * SECOND).await;
+    let after = plant.drive("mixer").snapshot();
+    assert!(after.lease == before.lease && after.lease.is_some() && after.setpoint == before.setpoint);
+    assert!(after.counters.lost == 0 && after.counters.polls > before.counters.polls);
+    assert!(runs(&plant, 1) && Plant::writes(&machine) == writes, "nothing is written to it");
+    // Who watches it by the old name sees the end of that; a stop by it is a stop.
+    let mut watch = old.watch();
+    watch.mark_unchanged();
+    assert!(watch.changed().await.is_err());
+    assert!(old.stop(StopMode::Ramp).await.is_confirmed() && !runs(&plant, 1) && runs(&plant, 2));
+    // It leaves by its policy, as every drive does.
+    started(&plant, "mixer").await;
+    let actions = plant.fleet.remove(&["mixer"], 60 * SECOND).await;
+    assert!(matches!(&*actions, [(name, ExitAction::Stopped(_))] if &**name == "mixer"), "{actions:?}");
+    assert!(!runs(&plant, 1));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_under_way_outlives_another_name() {
+    let mut plant = plant();
+    started(&plant, "1").await;
+    let machine = plant.sites[0].simulated.slave(1).expect("it is there");
+    machine.mute();
+    let drive = plant.drive("1");
+    tokio::spawn(async move { drive.stop(StopMode::Ramp).await });
+    sleep(5 * SECOND).await;
+    assert_eq!(plant.fleet.rename("1", DriveSettings::controlled("mixer")), Ok(()));
+    assert!(plant.drive("mixer").snapshot().stop.is_some());
+    machine.unmute();
+    timeout(PATIENCE, machine.wait_until(|machine| !machine.running)).await.expect("it is stopped");
+    plant.event("its confirmation", |kind| matches!(kind, EventKind::StopConfirmed { .. })).await;
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_line_is_exchanged_under_a_reader_of_events_who_notices_nothing_of_it() {
     let mut plant = plant();
     connected(&plant, "2").await;

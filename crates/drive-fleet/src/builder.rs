@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, RwLock, atomic::AtomicU64},
+    sync::{Arc, RwLock},
     time::Duration,
 };
 
@@ -479,11 +479,11 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
         slave,
         capabilities,
         watchdog,
-        settings: RwLock::new(settings),
+        settings: Arc::new(RwLock::new(settings)),
         broadcasts,
         messages,
         urgent,
-        calls: AtomicU64::new(0),
+        calls: Arc::default(),
         snapshots: snapshot,
         exit: exited,
     })

@@ -271,6 +271,8 @@ pub enum EventKind {
     RunNotAdopted(String),
     /// Other settings hold from now on: these.
     Reconfigured(Vec<&'static str>),
+    /// It is called otherwise from now on, and is the same drive: what it was called.
+    Renamed(Arc<str>),
     /// What was done to it when the fleet shut down.
     Exit(ExitAction),
     /// What was done to it when it was taken out of the fleet, such as by a reload. What has the same name afterwards is
@@ -320,6 +322,7 @@ impl EventKind {
             Self::RunAdopted(_) => "run adopted",
             Self::RunNotAdopted(_) => "run not adopted",
             Self::Reconfigured(_) => "reconfigured",
+            Self::Renamed(_) => "renamed",
             Self::Exit(_) => "exit",
             Self::Removed(_) => "removed",
         }
@@ -375,6 +378,7 @@ impl fmt::Display for EventKind {
             Self::ControlElsewhere(control) => write!(f, ": with {control}"),
             Self::StartTookCommand(other) => write!(f, " from {other}"),
             Self::Reconfigured(settings) => write!(f, ": {}", settings.join(", ")),
+            Self::Renamed(old) => write!(f, ": it was called {old}"),
             Self::Identified(identity) => write!(f, ": {}", identity),
             Self::IdentityChanged { remembered, found } => {
                 write!(f, ": {} instead of {}", found, remembered)

@@ -42,14 +42,14 @@ pub(crate) struct Entry {
     pub(crate) slave: SlaveAddress,
     pub(crate) capabilities: &'static Capabilities,
     pub(crate) watchdog: Option<WatchdogCapability>,
-    /// They may be exchanged.
-    pub(crate) settings: RwLock<Arc<DriveSettings>>,
+    /// They may be exchanged. Shared with the handles of whoever knows the drive by a name that it had before.
+    pub(crate) settings: Arc<RwLock<Arc<DriveSettings>>>,
     /// The writes that stop every drive of its family on a line, by mode.
-    pub(crate) broadcasts: Vec<(StopMode, BroadcastWrite)>,
+    pub(crate) broadcasts: Arc<[(StopMode, BroadcastWrite)]>,
     pub(crate) messages: mpsc::Sender<Message>,
     pub(crate) urgent: mpsc::UnboundedSender<Urgent>,
     /// The number of the last call.
-    pub(crate) calls: AtomicU64,
+    pub(crate) calls: Arc<AtomicU64>,
     pub(crate) snapshots: watch::Receiver<Arc<Snapshot>>,
     pub(crate) exit: watch::Receiver<Option<(ExitAction, Left)>>,
 }

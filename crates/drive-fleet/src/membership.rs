@@ -6,16 +6,19 @@ use std::{
 };
 
 use drive_bus::Line;
+use tokio::sync::watch;
 
 use crate::{
     builder::{FleetBuilder, FleetError, SettingProblem, check_settings},
     cause::Policy,
     event::ExitAction,
     fleet::{Fleet, Members, end},
+    handle::Entry,
     line_entry::LineEntry,
     message::Urgent,
     plan::forecast,
     settings::DriveSettings,
+    snapshot::Snapshot,
 };
 
 impl Fleet {
@@ -56,20 +59,56 @@ impl Fleet {
         let members = self.members();
         let entry = members.entries.iter().find(|entry| *entry.name == *settings.name);
         let Some(entry) = entry else { return Err(FleetError::NoSuchDrive(settings.name)) };
-        // What is only read is stopped by nobody: a motor that was started here would be left to itself.
-        let released = (entry.settings().control && !settings.control).then(|| SettingProblem {
-            setting: "control",
-            reason: "a drive under control is removed, by its policy, before it is only read".to_owned(),
-        });
-        let checked = check_settings(&settings, entry.capabilities, entry.watchdog);
-        if let Some(problem) = released.or_else(|| checked.err()) {
-            return Err(FleetError::Setting { drive: settings.name, problem });
-        }
+        check_exchange(entry, &settings)?;
         let settings = Arc::new(settings);
         *entry.settings.write().unwrap_or_else(PoisonError::into_inner) = Arc::clone(&settings);
         // A task that is gone has nothing to change.
         let _ = entry.urgent.send(Urgent::Settings(settings));
         replan(&members, &entry.line);
+        Ok(())
+    }
+
+    /// Calls the drive `old` otherwise, as these settings have it, which hold from now on. It is the same drive: its task, its orders, a
+    /// stop under way and its motor go on, and nothing is written to it. A handle of it by the old name commands it on; a watch by the
+    /// old name ends, as if the drive had left.
+    ///
+    /// # Errors
+    /// [`FleetError::NameTaken`], and as of [`reconfigure`](Self::reconfigure); nothing has changed then.
+    pub fn rename(&self, old: &str, settings: DriveSettings) -> Result<(), FleetError> {
+        let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut members = Members::clone(&self.members());
+        if members.entries.iter().any(|entry| *entry.name == *settings.name) {
+            return Err(FleetError::NameTaken(settings.name));
+        }
+        let Some(entry) = members.entries.iter_mut().find(|entry| *entry.name == *old) else {
+            return Err(FleetError::NoSuchDrive(old.to_owned()));
+        };
+        check_exchange(entry, &settings)?;
+        let settings = Arc::new(settings);
+        let name: Arc<str> = Arc::from(settings.name.as_str());
+        let now = Snapshot { name: Arc::clone(&name), ..Snapshot::clone(&entry.snapshots.borrow()) };
+        let (told, snapshots) = watch::channel(Arc::new(now));
+        let renamed = Arc::new(Entry {
+            name,
+            line: Arc::clone(&entry.line),
+            slave: entry.slave,
+            capabilities: entry.capabilities,
+            watchdog: entry.watchdog,
+            settings: Arc::clone(&entry.settings),
+            broadcasts: Arc::clone(&entry.broadcasts),
+            messages: entry.messages.clone(),
+            urgent: entry.urgent.clone(),
+            calls: Arc::clone(&entry.calls),
+            snapshots,
+            exit: entry.exit.clone(),
+        });
+        *entry.settings.write().unwrap_or_else(PoisonError::into_inner) = Arc::clone(&settings);
+        let line = Arc::clone(&renamed.line);
+        *entry = renamed;
+        // A task that is gone has nothing to change.
+        let _ = entry.urgent.send(Urgent::Renamed(settings, told));
+        replan(&members, &line);
+        self.set_members(members);
         Ok(())
     }
 
@@ -112,6 +151,20 @@ impl Fleet {
         let removed = members.lines.remove(at);
         self.set_members(members);
         Some(removed.line.clone())
+    }
+}
+
+/// Checks the settings that a drive is to have from now on.
+fn check_exchange(entry: &Entry, settings: &DriveSettings) -> Result<(), FleetError> {
+    // What is only read is stopped by nobody: a motor that was started here would be left to itself.
+    let released = (entry.settings().control && !settings.control).then(|| SettingProblem {
+        setting: "control",
+        reason: "a drive under control is removed, by its policy, before it is only read".to_owned(),
+    });
+    let checked = check_settings(settings, entry.capabilities, entry.watchdog);
+    match released.or_else(|| checked.err()) {
+        Some(problem) => Err(FleetError::Setting { drive: settings.name.clone(), problem }),
+        None => Ok(()),
     }
 }
 

@@ -3,13 +3,17 @@
 use std::{sync::Arc, time::Duration};
 
 use drive_core::Setpoint;
-use tokio::{sync::oneshot, time::Instant};
+use tokio::{
+    sync::{oneshot, watch},
+    time::Instant,
+};
 
 use crate::{
     cause::{Act, Policy},
     outcome::{Order, Refused},
     progress::Report,
     settings::DriveSettings,
+    snapshot::Snapshot,
     stop_order::StopOrder,
     supervisor::{CallId, Leave, Question, Told},
 };
@@ -49,6 +53,9 @@ pub(crate) enum Urgent {
     Withdraw(CallId),
     /// Other settings.
     Settings(Arc<DriveSettings>),
+    /// It is called otherwise: its settings with the name, and where its snapshots are told from now on. Whoever watches it by the old
+    /// name sees the end of it.
+    Renamed(Arc<DriveSettings>, watch::Sender<Arc<Snapshot>>),
     /// The fleet shuts down, or the drive leaves it: by which policy it ends.
     Exit(Policy),
     /// The time for shutting down is over.

@@ -66,6 +66,19 @@ impl Keeper {
         }
     }
 
+    /// The drive may be called otherwise now: what is kept of it is kept by the name that it has.
+    pub(crate) fn follow_name(&mut self, name: Arc<str>) {
+        if self.drive == name {
+            return;
+        }
+        let old = std::mem::replace(&mut self.drive, name);
+        // First by the new one: a program that is killed between both has told of the run twice, and not never.
+        if let Some(run) = self.told.clone() {
+            self.tell(Some(run), None);
+            self.send(old, None, None);
+        }
+    }
+
     /// A run command is about to be given.
     pub(crate) async fn before(&mut self, record: RunRecord) {
         if self.keeps.is_none() || self.told.as_ref() == Some(&record) {
@@ -79,8 +92,12 @@ impl Keeper {
 
     fn tell(&mut self, run: Option<RunRecord>, kept: Option<oneshot::Sender<()>>) {
         self.told.clone_from(&run);
+        self.send(Arc::clone(&self.drive), run, kept);
+    }
+
+    fn send(&self, drive: Arc<str>, run: Option<RunRecord>, kept: Option<oneshot::Sender<()>>) {
         if let Some(keeps) = &self.keeps {
-            let _ = keeps.send(RunKept { drive: Arc::clone(&self.drive), run, kept });
+            let _ = keeps.send(RunKept { drive, run, kept });
         }
     }
 }

@@ -52,6 +52,7 @@ impl Task {
                 let accepted: Vec<&str> = settings.accept_self_restart.iter().map(String::as_str).collect();
                 drive.accept_self_restart(&accepted);
                 drive.set_coast_time(settings.coast);
+                keeper.follow_name(desk.supervisor.name());
             }
             drive.set_injection_time(desk.supervisor.injection());
             if let Some(lease) = desk.supervisor.take_adoption() {
@@ -240,6 +241,13 @@ impl Desk {
             Urgent::Settings(settings) => {
                 self.supervisor.handle_settings(now, &settings);
                 self.settings = Some(settings);
+                false
+            }
+            Urgent::Renamed(settings, snapshots) => {
+                // What has happened so far has happened to the drive of the old name.
+                self.publish();
+                self.supervisor.handle_settings(now, &settings);
+                (self.settings, self.snapshots) = (Some(settings), snapshots);
                 false
             }
             Urgent::Exit(why) => self.supervisor.handle_exit(now, why),

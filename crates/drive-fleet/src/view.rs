@@ -455,6 +455,10 @@ pub enum Happened {
     Reconfigured {
         settings: Vec<String>,
     },
+    Renamed {
+        /// What it was called.
+        was: Arc<str>,
+    },
     Exit {
         exit: ExitView,
     },
@@ -543,6 +547,7 @@ impl From<&EventKind> for Happened {
             EventKind::Reconfigured(settings) => {
                 Self::Reconfigured { settings: settings.iter().map(|name| (*name).to_owned()).collect() }
             }
+            EventKind::Renamed(old) => Self::Renamed { was: Arc::clone(old) },
             EventKind::Exit(action) => Self::Exit { exit: action.into() },
             EventKind::Removed(action) => Self::Removed { exit: action.into() },
         }

@@ -57,6 +57,13 @@ impl<T: Serialize + DeserializeOwned + PartialEq> Records<T> {
         }
     }
 
+    /// The drive is called otherwise: its record goes with it. Gives whether the file is to be written for it.
+    pub fn rename(&mut self, old: &str, new: &str) -> bool {
+        let Some(record) = self.drives.remove(old) else { return false };
+        self.drives.insert(new.to_owned(), record);
+        true
+    }
+
     /// Writes the file. What cannot be written is told once, until it can be again.
     pub fn write(&mut self) {
         let Some(file) = &self.file else { return };
@@ -86,7 +93,11 @@ where
                 Received::Missed(_) => continue,
                 Received::End => return,
             };
-            if !note(&mut records, &drive, &kind) {
+            let is_another = match &kind {
+                EventKind::Renamed(old) => records.rename(old, &drive),
+                kind => note(&mut records, &drive, kind),
+            };
+            if !is_another {
                 continue;
             }
             let written = spawn_blocking(move || {
@@ -123,6 +134,9 @@ mod tests {
         // The program was killed.
         let mut records = open();
         assert_eq!((records.of("pump 1"), records.of("pump 2")), (Some(&7), None));
+        assert!(records.rename("pump 1", "mixer") && !records.rename("pump 1", "mixer"));
+        assert_eq!((records.of("pump 1"), records.of("mixer")), (None, Some(&7)));
+        assert!(records.rename("mixer", "pump 1"));
         assert!(records.set("pump 1", None) && !records.set("pump 1", None));
         records.write();
         assert_eq!(open().of("pump 1"), None);

@@ -80,6 +80,7 @@ pub use self::{
     },
     tokens::of_days,
 };
+use drived_config::names::Names;
 pub use drived_config::rights::{Caller, Rights, Role, Scope};
 use drived_words::failure::Failure;
 
@@ -116,7 +117,15 @@ pub struct Prepared {
     sessions: Sessions,
     #[cfg(unix)]
     socket: Option<Entrance>,
-    http: Option<(HttpConfig, Option<Tls>)>,
+    http: Option<HttpDoor>,
+}
+
+/// The door of HTTP.
+struct HttpDoor {
+    config: HttpConfig,
+    tls: Option<Tls>,
+    /// `None`: its address cannot be had yet.
+    listener: Option<TcpListener>,
 }
 
 /// What every door and connection has.
@@ -129,7 +138,8 @@ struct Shared {
 }
 
 impl Doors {
-    /// Finds what the doors of a configuration need. Nobody is let in before they are [opened](Prepared::open).
+    /// Finds what the doors of a configuration need, and takes their addresses where they are free: whoever connects from now on waits.
+    /// Nobody is let in before they are [opened](Prepared::open).
     ///
     /// # Errors
     ///
@@ -142,9 +152,10 @@ impl Doors {
             }
             tokens => tokens.map_err(|error| Failure::Input(error.to_string()))?.map(Arc::new),
         };
-        let http = config.http.map(|http| {
-            let tls = http.tls.as_ref().map(Tls::open).transpose().map_err(Failure::Input)?;
-            Ok((http, tls))
+        let http = config.http.map(|config| {
+            let tls = config.tls.as_ref().map(Tls::open).transpose().map_err(Failure::Input)?;
+            let listener = bound(config.listen).ok();
+            Ok(HttpDoor { config, tls, listener })
         });
         let http = http.transpose()?;
         let sessions = Sessions::in_folder(config.state.folder.as_deref(), Instant::now());
@@ -198,8 +209,8 @@ impl Prepared {
         if let Some(entrance) = self.socket {
             tokio::spawn(until_the_end(shared.clone(), entrance.serve_all(shared.clone())));
         }
-        if let Some((http, tls)) = self.http {
-            tokio::spawn(until_the_end(shared.clone(), serve_http(http, tls, listens, shared)));
+        if let Some(door) = self.http {
+            tokio::spawn(until_the_end(shared.clone(), serve_http(door, listens, shared)));
         }
         Doors { ended, gone, listening, audit, codes, page, has_tokens }
     }
@@ -237,8 +248,8 @@ impl Doors {
     }
 
     /// Keeps in the audit log what becomes of each command, until the fleet ends.
-    pub fn follow(&self, events: Events) -> JoinHandle<()> {
-        tokio::spawn(audit::follow(self.audit.clone(), events))
+    pub fn follow(&self, names: Names, events: Events) -> JoinHandle<()> {
+        tokio::spawn(audit::follow(self.audit.clone(), names, events))
     }
 
     /// Lets nobody in any more, ends the event streams, and waits a little for answers that are under way.
@@ -257,8 +268,12 @@ async fn until_the_end(shared: Shared, serve: impl Future<Output = ()>) {
     }
 }
 
-async fn serve_http(config: HttpConfig, tls: Option<Tls>, listens: watch::Sender<bool>, shared: Shared) {
-    let listener = listen(config.listen).await;
+async fn serve_http(door: HttpDoor, listens: watch::Sender<bool>, shared: Shared) {
+    let HttpDoor { config, tls, listener } = door;
+    let listener = match listener {
+        Some(listener) => listener,
+        None => listen(config.listen).await,
+    };
     let scheme = if tls.is_some() { "https" } else { "http" };
     let address = listener.local_addr().unwrap_or(config.listen);
     tracing::info!("the page is at {scheme}://{address}/");

@@ -1,8 +1,13 @@
 //! One alarm from its coming to its end, as everybody tells it who was not written here: a staged trip is told, taken note of by a SCADA host
-//! with a note, and reset; the API, a reader of MQTT, a host of Sparkplug, Prometheus with the rules of the program and the receiver of a
-//! webhook are asked at each step. `-- --nocapture` prints what each said.
+//! with a note, and reset; the API, the page in Chromium on a screen and on a phone, a reader of MQTT, Home Assistant itself, a host of
+//! Sparkplug, Prometheus with the rules of the program and the receiver of a webhook are asked at each step. `-- --nocapture` prints what
+//! each said.
 #![cfg(unix)]
 
+#[path = "mqtt/home.rs"]
+mod home;
+#[path = "support/page.rs"]
+mod page;
 #[path = "support/prometheus.rs"]
 mod prometheus;
 #[path = "mqtt/rig.rs"]
@@ -10,7 +15,9 @@ mod rig;
 mod support;
 
 use std::{
-    env, fs,
+    env,
+    fmt::Debug,
+    fs,
     io::{BufRead as _, BufReader, ErrorKind, Lines, Read as _, Write as _},
     net::{TcpListener, TcpStream},
     path::Path,
@@ -19,6 +26,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use home::HomeAssistant;
+use page::Page;
 use prometheus::Prometheus;
 use rig::{Ear, Mosquitto};
 use serde_json::{Value, json};
@@ -48,6 +57,27 @@ fn told(alarm: &Value) -> String {
 fn trip_of(alarms: &Value) -> Value {
     let mut alarms = alarms.as_array().into_iter().flatten();
     alarms.find(|alarm| alarm["kind"] == "tripped").cloned().unwrap_or_default()
+}
+
+/// What an alarm is that is shown on the page, in its plain words.
+fn shown(alarms: &Value) -> String {
+    let mut alarms = alarms.as_array().expect("a list").iter();
+    let text = |alarm: &Value, key: &str| alarm[key].as_str().unwrap_or_default().to_owned();
+    let Some(alarm) = alarms.find(|alarm| text(alarm, "title").contains("tripped")) else {
+        return "none".to_owned();
+    };
+    assert!(alarm["isWhole"] == true, "it is cut off: {alarm}");
+    let state = match text(alarm, "state").as_str() {
+        "not acknowledged" => "unacknowledged".to_owned(),
+        "over, not acknowledged" => "returned".to_owned(),
+        other => other.to_owned(),
+    };
+    let all = text(alarm, "text");
+    let who = all.lines().find_map(|line| line.split_once("acknowledged by ")).map(|(_, who)| who);
+    match who.and_then(|who| Some((who.split_once(',')?.0, who.rsplit_once(": ")?.1))) {
+        Some((who, note)) => format!("{state}, by {who}: {note}"),
+        None => state,
+    }
 }
 
 /// A host of Sparkplug: pysparkplug. Killed when dropped.
@@ -148,11 +178,27 @@ fn taken(mut stream: TcpStream) -> Value {
     }
 }
 
+/// What is said once it is as it should be.
+#[track_caller]
+fn until<T: Debug>(mut say: impl FnMut() -> T, is_so: impl Fn(&T) -> bool) -> T {
+    let end = Instant::now() + PATIENCE;
+    loop {
+        let said = say();
+        if is_so(&said) {
+            return said;
+        }
+        assert!(Instant::now() < end, "it says {said:?}");
+        thread::yield_now();
+    }
+}
+
 /// Everybody who is told.
 struct Faces {
     http: u16,
     ear: Ear,
     host: Host,
+    home: Option<HomeAssistant>,
+    page: Option<Page>,
     prometheus: Prometheus,
     receiver: Receiver,
 }
@@ -160,16 +206,34 @@ struct Faces {
 impl Faces {
     /// Waits until everybody says this of the trip, and prints it.
     fn all_say(&mut self, step: &str, alarm: &str, is_firing: bool, posted: &str) {
-        let end = Instant::now() + PATIENCE;
-        let api = loop {
+        let api = || {
             let said: Value = serde_json::from_str(&get(self.http, "/api/v1/alarms", "*/*")).expect("JSON");
-            let said = told(&trip_of(&said["alarms"]));
-            if said == alarm {
-                break said;
-            }
-            assert!(Instant::now() < end, "the API says {said}");
-            thread::yield_now();
+            told(&trip_of(&said["alarms"]))
         };
+        let api = until(api, |said| said == alarm);
+        let page = self.page.as_mut().map(|page| {
+            until(
+                || {
+                    let said = page.shows("alarms");
+                    (shown(&said["desk"]), shown(&said["phone"]))
+                },
+                |(desk, phone)| desk == alarm && phone == alarm,
+            )
+        });
+        let home = self.home.as_mut().map(|home| {
+            let state = |home: &mut HomeAssistant| {
+                let now = home.entity("sensor.pump_alarms");
+                let trip = trip_of(&now["attributes"]["alarms"]);
+                assert!(
+                    trip.is_null() || now["attributes"]["kind"] != "tripped" || now["state"] == trip["state"],
+                    "{now}"
+                );
+                let problem = home.entity("binary_sensor.pump_problem")["state"].take();
+                (told(&trip), problem.as_str() == Some("on"))
+            };
+            // There is a problem while it is so, whoever has seen it.
+            until(|| state(home), |(trip, problem)| trip == alarm && *problem == is_firing)
+        });
         let (_, said, retained) = self.ear.until(|_, said| told(&trip_of(&said["alarms"])) == alarm);
         let mqtt = format!("{}{}", told(&trip_of(&said["alarms"])), if retained { ", retained" } else { "" });
         let sparkplug = self.host.until(|told| told == alarm);
@@ -186,7 +250,11 @@ impl Faces {
             (is_there && fires == is_firing).then(|| format!("{state}{word}"))
         });
         let webhook = self.receiver.until(|told| told == posted);
-        println!("| {step} | {api} | {mqtt} | {sparkplug} | {firing} | {webhook} |");
+        let page = page.map_or("not there".to_owned(), |(desk, phone)| format!("{desk} | {phone}"));
+        let home = home.map_or("not there".to_owned(), |(trip, problem)| {
+            format!("{trip}{}", if problem { ", a problem" } else { "" })
+        });
+        println!("| {step} | {api} | {page} | {mqtt} | {home} | {sparkplug} | {firing} | {webhook} |");
     }
 }
 
@@ -208,7 +276,7 @@ fn a_trip_is_told_taken_note_of_and_over_the_same_at_every_face() {
         "alarm-life",
         &format!(
             "state = \"{}\"\n[http]\nlisten = \"127.0.0.1:{http}\"\n[mqtt]\nservers = [\"mqtt://127.0.0.1:{}\"]\n\
-             interval = \"250ms\"\n[mqtt.sparkplug]\ngroup = \"plant\"\nedge_node = \"hall 1\"\ncommands = \"operate\"\n\
+             interval = \"250ms\"\nheartbeat = \"1s\"\ndiscovery = \"device\"\n[mqtt.sparkplug]\ngroup = \"plant\"\nedge_node = \"hall 1\"\ncommands = \"operate\"\n\
              [[webhooks]]\nurl = \"http://127.0.0.1:{posted_to}/\"\npause = \"0s\"\n\
              [lines.bench]\nport = \"{},19200,8E1\"\n\
              [[drives]]\nline = \"bench\"\ndrive = \"atv312@1\"\nname = \"pump\"\ncontrol = true\n",
@@ -217,14 +285,19 @@ fn a_trip_is_told_taken_note_of_and_over_the_same_at_every_face() {
             sim.link()
         ),
     );
-    let ear = broker.hear(&["drived/drive/pump/alarms"]);
+    // It hears for as long as anything here takes.
+    let ear = broker.hear_as(&["drived/drive/pump/alarms"], &["-W", "600"]);
     let host = Host::start(&python, broker.port, "pump");
+    let home = HomeAssistant::python();
+    let home = home.map(|python| HomeAssistant::start(&python, path("alarm-life-home"), &broker));
     let mut daemon = Running::start(&["run", "--config", file.path()]);
     daemon.wait_for(r#""event":"identified""#);
     let prometheus = Prometheus::start("alarm-life-prometheus", &[http]);
-    let mut faces = Faces { http, ear, host, prometheus, receiver };
+    let page = Page::is_installed().then(|| Page::open(http));
+    let mut faces = Faces { http, ear, host, home, page, prometheus, receiver };
     println!(
-        "| Step | API, which the page shows | MQTT | Sparkplug (pysparkplug) | Prometheus | Webhook |\n|---|---|---|---|---|---|"
+        "| Step | API | Page | Page on a phone | MQTT | Home Assistant | Sparkplug (pysparkplug) | Prometheus | Webhook |\n\
+         |---|---|---|---|---|---|---|---|---|"
     );
 
     sim.say(&format!("atv312@1 trip {TRIP}"), "done");
@@ -240,6 +313,7 @@ fn a_trip_is_told_taken_note_of_and_over_the_same_at_every_face() {
     faces.all_say("it trips again", "unacknowledged", true, "unacknowledged");
     sim.say("atv312@1 panel reset", "done");
     faces.all_say("it is reset unseen", "returned", false, "returned");
+    faces.page.take().into_iter().for_each(Page::close);
     drop(faces);
     assert_eq!(daemon.interrupt().0, Some(0));
     fs::remove_dir_all(folder).expect("it is there");

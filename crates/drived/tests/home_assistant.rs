@@ -4,112 +4,18 @@
 
 #![cfg(unix)]
 
+#[path = "mqtt/home.rs"]
+mod home;
 #[path = "mqtt/rig.rs"]
 mod rig;
 mod support;
 
-use std::{
-    fs,
-    io::{BufRead as _, BufReader, Write as _},
-    path::PathBuf,
-    process::{Child, ChildStdin, ChildStdout, Command, Stdio},
-};
+use std::{fs, path::PathBuf};
 
+use home::HomeAssistant;
 use rig::{Daemon, Mosquitto};
 use serde_json::{Value, json};
-use support::{free_port, is_there, path};
-
-/// Home Assistant in a folder of its own; killed when dropped.
-struct HomeAssistant {
-    child: Child,
-    input: ChildStdin,
-    lines: BufReader<ChildStdout>,
-    folder: PathBuf,
-}
-
-impl HomeAssistant {
-    /// `None` where it is not installed.
-    fn python() -> Option<String> {
-        let python = std::env::var("DRIVED_HOME_ASSISTANT_PYTHON").unwrap_or_else(|_| "python3".to_owned());
-        is_there(&python, &["-c", "import homeassistant.components.mqtt.client"]).then_some(python)
-    }
-
-    fn start(python: &str, folder: PathBuf, broker: &Mosquitto) -> Self {
-        fs::create_dir_all(&folder).expect("the directory can be written");
-        fs::write(folder.join("configuration.yaml"), "").expect("the directory can be written");
-        let mut child = Command::new(python)
-            .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mqtt/home_assistant.py"))
-            .arg(&folder)
-            .args([broker.port.to_string(), free_port().to_string()])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("python runs");
-        let (input, out) = (child.stdin.take().expect("a pipe"), child.stdout.take().expect("a pipe"));
-        let mut home = Self { child, input, lines: BufReader::new(out), folder };
-        println!("Home Assistant {}", home.answer());
-        home
-    }
-
-    fn answer(&mut self) -> Value {
-        let mut line = String::new();
-        self.lines.read_line(&mut line).expect("it is text");
-        assert!(!line.is_empty(), "Home Assistant has ended");
-        serde_json::from_str(&line).expect("it is JSON")
-    }
-
-    /// Says a line, and gives what is answered.
-    #[track_caller]
-    fn say(&mut self, line: &str) -> Value {
-        writeln!(self.input, "{line}").expect("it reads");
-        let answer = self.answer();
-        assert!(answer.get("error").is_none(), "{line}: {answer:#}");
-        answer
-    }
-
-    /// Waits until an entity is in a state, and gives its attributes.
-    #[track_caller]
-    fn wait(&mut self, entity: &str, state: &str) -> Value {
-        self.say(&format!("wait {entity} {state}"))
-    }
-
-    #[track_caller]
-    fn state(&mut self, entity: &str) -> String {
-        let states = self.say("states");
-        states[entity].as_str().unwrap_or_else(|| panic!("{entity} is none of {states:#}")).to_owned()
-    }
-
-    /// The states that an entity has been in since they were forgotten.
-    #[track_caller]
-    fn seen(&mut self, entity: &str) -> Vec<String> {
-        serde_json::from_value(self.say(&format!("seen {entity}"))["states"].take()).expect("states")
-    }
-
-    /// What it has complained of but for the connection, which the test cuts.
-    #[track_caller]
-    fn complaints(&mut self) -> Vec<String> {
-        let log: Vec<String> = serde_json::from_value(self.say("log")["log"].take()).expect("lines");
-        let is_of_the_cut = |line: &String| line.contains("connect") || line.contains("Connect");
-        log.into_iter().filter(|line| !is_of_the_cut(line)).collect()
-    }
-
-    /// Ends it as its own service does, and gives its folder.
-    fn end(mut self) -> PathBuf {
-        self.say("end");
-        self.child.wait().expect("it ends");
-        std::mem::take(&mut self.folder)
-    }
-}
-
-impl Drop for HomeAssistant {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-        if !self.folder.as_os_str().is_empty() {
-            let _ = fs::remove_dir_all(&self.folder);
-        }
-    }
-}
+use support::path;
 
 /// A daemon on this broker that goes on where it was when it is started again; the heartbeat is the usual one, so that nothing here can
 /// be right by being told again.

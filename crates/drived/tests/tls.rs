@@ -45,10 +45,6 @@ impl Daemon {
         for _ in 0..2 {
             running.wait_for(r#""event":"identified""#);
         }
-        // On a busy machine the drives may be known before the door is open.
-        while std::net::TcpStream::connect(("127.0.0.1", port)).is_err() {
-            std::thread::yield_now();
-        }
         Self { running: Some(running), _sim: sim, _file: config, folder, port }
     }
 

@@ -1,8 +1,12 @@
 //! Every face beside what the drives themselves say: five families on one line, read through the gateway word by word and by the manuals, and
-//! as the API, MQTT, a host of Sparkplug, Prometheus' text and the virtual unit tell them, with their ages; while drives are called otherwise,
-//! trip, are lost, leave and come back. `-- --nocapture` prints what each said.
+//! as the API, the page in Chromium, `drived status`, MQTT, Home Assistant itself, a host of Sparkplug, Prometheus' text and the virtual unit
+//! tell them, with their ages; while drives are called otherwise, trip, are lost, leave and come back. `-- --nocapture` prints what each said.
 #![cfg(unix)]
 
+#[path = "mqtt/home.rs"]
+mod home;
+#[path = "support/page.rs"]
+mod page;
 #[path = "mqtt/rig.rs"]
 mod rig;
 mod support;
@@ -17,6 +21,8 @@ use std::{
     time::{Duration, Instant, SystemTime, UNIX_EPOCH},
 };
 
+use home::HomeAssistant;
+use page::Page;
 use rig::Mosquitto;
 use serde_json::Value;
 use support::{Running, Sim, free_port, get, is_there, path, run};
@@ -47,17 +53,55 @@ const FAMILIES: [Family; 5] = [
     Family { drive: "3g3ev@5", unit: 5, frequency: (0x0024, 0.1), current: Some((0x0027, 0.1)) },
 ];
 
-/// A slow value: its place among the families; its register, and how much a count is; as the API, as Prometheus with how much of the API's unit
-/// its own is, and as Sparkplug has it.
-type Slow = (usize, (u16, f64), &'static str, (&'static str, f64), &'static str);
+/// A slow value, and where each has it.
+struct Slow {
+    /// Of which family.
+    place: usize,
+    /// Register, and how much a count is in the unit of the API.
+    register: (u16, f64),
+    api: &'static str,
+    /// And how much of the API's unit its own is.
+    prometheus: (&'static str, f64),
+    sparkplug: &'static str,
+    /// In whole units.
+    page: &'static str,
+    /// Home Assistant has no class for a share of a voltage.
+    home: Option<&'static str>,
+}
 
 /// ATV312: BBV51701 p. 21, 3207 ULn 0.1 V; ATV28: p. 57 there, W454 ULn 0.1 V; ATV21: §8.3, FE04 in 0.01 %; 3G3EV: §5.2, 0031h in V.
 const SLOW: [Slow; 4] = [
-    (0, (3_207, 0.1), "line_voltage_v", ("line_voltage_volts", 1.0), "Line Voltage"),
-    (1, (454, 0.1), "line_voltage_v", ("line_voltage_volts", 1.0), "Line Voltage"),
-    (3, (0xFE04, 0.01), "dc_bus_voltage_percent", ("bus_voltage_ratio", 100.0), "DC Bus Voltage Share"),
-    (4, (0x0031, 1.0), "dc_bus_voltage_v", ("bus_voltage_volts", 1.0), "DC Bus Voltage"),
+    LINE_VOLTAGE,
+    Slow { place: 1, register: (454, 0.1), ..LINE_VOLTAGE },
+    Slow {
+        place: 3,
+        register: (0xFE04, 0.01),
+        api: "dc_bus_voltage_percent",
+        prometheus: ("bus_voltage_ratio", 100.0),
+        sparkplug: "DC Bus Voltage Share",
+        page: "DC bus voltage",
+        home: None,
+    },
+    Slow {
+        place: 4,
+        register: (0x0031, 1.0),
+        api: "dc_bus_voltage_v",
+        prometheus: ("bus_voltage_volts", 1.0),
+        sparkplug: "DC Bus Voltage",
+        page: "DC bus voltage",
+        home: Some("dc_bus_voltage"),
+    },
 ];
+
+const LINE_VOLTAGE: Slow = Slow {
+    place: 0,
+    register: (3_207, 0.1),
+    api: "line_voltage_v",
+    prometheus: ("line_voltage_volts", 1.0),
+    sparkplug: "Line Voltage",
+    page: "Line voltage",
+    home: Some("mains_voltage"),
+};
 
 /// What somebody says of a drive. Frequency and current in hundredths, so that they are the same or not.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,6 +120,22 @@ impl Said {
 
 fn hundredths(value: f64) -> i64 {
     (value * 100.0).round() as i64
+}
+
+/// What a person reads, such as `1.2 A`, where it is in this unit.
+fn read(text: &str, unit: &str) -> Option<f64> {
+    let (value, of) = text.trim().split_once(char::is_whitespace)?;
+    (of.trim() == unit).then(|| value.parse().ok()).flatten()
+}
+
+/// A time of a few seconds, as a person reads it.
+fn seconds(text: &str) -> Option<f64> {
+    read(text, "s").or_else(|| Some(read(text, "ms")? / 1_000.0))
+}
+
+/// The short name of a family, of which its drive has its id, its topic and its entities.
+fn short(family: &Family) -> &'static str {
+    family.drive.split('@').next().unwrap_or_default()
 }
 
 fn now() -> f64 {
@@ -125,11 +185,15 @@ struct Plant {
     daemon: Running,
     broker: Mosquitto,
     host: Host,
+    home: Option<HomeAssistant>,
+    page: Option<Page>,
     http: u16,
     gateway: u16,
     folder: PathBuf,
     /// The names of the drives now, in the order of the families; an empty one is not in the file.
     names: [String; 5],
+    /// The table has begun.
+    has_head: bool,
 }
 
 impl Plant {
@@ -144,8 +208,9 @@ impl Plant {
         let folder = path("values-folder");
         fs::create_dir_all(&folder).expect("the directory can be written");
         let host = Host::start(&python, broker.port);
-        let names =
-            FAMILIES.map(|family| format!("the {}", family.drive.split('@').next().unwrap_or_default()));
+        let home = HomeAssistant::python();
+        let home = home.map(|python| HomeAssistant::start(&python, path("values-home"), &broker));
+        let names = FAMILIES.map(|family| format!("the {}", short(&family)));
         let (http, gateway) = (free_port(), free_port());
         configure(&folder, (sim.link(), broker.port, http, gateway), &names);
         let at = |name: &str| folder.join(name).display().to_string();
@@ -153,17 +218,24 @@ impl Plant {
         for _ in drives {
             daemon.wait_for(r#""event":"connected""#);
         }
-        Some(Self { sim, daemon, broker, host, http, gateway, folder, names })
+        let page = Page::is_installed().then(|| Page::open(http));
+        Some(Self { sim, daemon, broker, host, home, page, http, gateway, folder, names, has_head: false })
     }
 
     fn at(&self, name: &str) -> String {
         self.folder.join(name).display().to_string()
     }
 
-    /// On a busy machine it may be too late for one: then it is asked again, as a person does.
+    /// It is asked again where it was not ready, or too late on a busy machine, as a person does.
     fn start_motor(&self, name: &str, hertz: &str) {
-        let started = || run(&["start", name, "--setpoint", hertz, "--socket", &self.at("socket")]);
-        while started().err.contains("expired") {}
+        let end = Instant::now() + PATIENCE;
+        loop {
+            let started = run(&["start", name, "--setpoint", hertz, "--socket", &self.at("socket")]);
+            if started.code == Some(0) {
+                return;
+            }
+            assert!(Instant::now() < end, "{started:?}");
+        }
     }
 
     /// Another configuration holds.
@@ -197,47 +269,79 @@ impl Plant {
         (word(family.frequency), family.current.and_then(word))
     }
 
-    /// What each face says of the drive of this id, short name and place.
-    fn faces(&mut self, id: &str, short: &str, slot: u16) -> [(&'static str, Said); 5] {
-        [
-            ("API", self.api(id)),
-            ("MQTT", self.mqtt(short)),
-            ("Sparkplug", self.sparkplug(id)),
-            ("Prometheus", self.prometheus(id)),
-            ("virtual unit", self.virtual_unit(slot)),
-        ]
+    /// What each face says of the drive of this place.
+    fn faces(&mut self, place: usize) -> Vec<(&'static str, Said)> {
+        let short = short(&FAMILIES[place]);
+        let (id, entities) = (format!("the {short}"), format!("the_{short}"));
+        // Who is not in the file is looked for by the name that he had.
+        let name = match self.names[place].as_str() {
+            "" => id.clone(),
+            name => name.to_owned(),
+        };
+        let mut faces = vec![("API", self.api(&id)), ("status", self.status(&name))];
+        faces.extend(self.page.as_mut().map(|page| ("page", page_of(&page.shows("rows")[&name]))));
+        faces.push(("MQTT", self.mqtt(&entities)));
+        faces.extend(self.home.as_mut().map(|home| ("Home Assistant", home_of(home, &entities))));
+        faces.push(("Sparkplug", self.sparkplug(&id)));
+        faces.push(("Prometheus", self.prometheus(&id)));
+        faces.push(("virtual unit", self.virtual_unit(place as u16)));
+        faces
+    }
+
+    /// A drive of the API, and when that was so.
+    fn drive(&self, id: &str) -> Option<(Value, Value)> {
+        let mut state: Value =
+            serde_json::from_str(&get(self.http, "/api/v1/state", "*/*")).expect("it is JSON");
+        let drives = state["drives"].as_array_mut().expect("a list");
+        let drive = drives.iter_mut().find(|drive| drive["id"] == id)?.take();
+        Some((drive, state["time_unix_ms"].take()))
     }
 
     fn api(&self, id: &str) -> Said {
-        let state: Value = serde_json::from_str(&get(self.http, "/api/v1/state", "*/*")).expect("it is JSON");
-        let drives = state["drives"].as_array().expect("a list");
-        let drive = drives.iter().find(|drive| drive["id"] == id);
-        drive.map_or(Said::NOTHING, |drive| live(&drive["status"], &state["time_unix_ms"]))
+        self.drive(id).map_or(Said::NOTHING, |(drive, time)| live(&drive["status"], &time))
+    }
+
+    /// As `drived status` prints it for a person, who is told where that is not of now.
+    fn status(&self, name: &str) -> Said {
+        let told = run(&["status", name, "--socket", &self.at("socket")]).out;
+        let row = |label: &str| {
+            let mut rows = told.lines().map(str::trim);
+            rows.find_map(|line| line.strip_prefix(label)?.strip_prefix("  ")).map(str::trim)
+        };
+        let Some(state) = row("state").filter(|_| row("status").is_none()) else { return Said::NOTHING };
+        // Its direction, and what has tripped it, are values of their own.
+        let is_of_it = |word: &&str| !["fwd", "rev"].contains(word) && word.contains(char::is_lowercase);
+        let state: Vec<&str> = state.split_whitespace().filter(is_of_it).collect();
+        Said {
+            frequency: row("output frequency").and_then(|text| read(text, "Hz")).map(hundredths),
+            current: row("motor current").and_then(|text| read(text, "A")).map(hundredths),
+            state: Some(state.join("_")),
+            at: row("age").and_then(seconds).map(|age| now() - age),
+        }
+    }
+
+    /// What the broker has kept of these topics of a drive, by their last levels.
+    fn kept(&self, short: &str, topics: &[&str]) -> BTreeMap<String, String> {
+        let port = self.broker.port.to_string();
+        let mut command = Command::new("mosquitto_sub");
+        command.args(["-V", "5", "-p", &port, "-W", "3", "-F", "%t %p", "-C", &topics.len().to_string()]);
+        for topic in topics {
+            command.args(["-t", &format!("drived/drive/{short}/{topic}")]);
+        }
+        let told = command.output().expect("it comes with mosquitto");
+        let told = String::from_utf8(told.stdout).expect("it is text");
+        let told = told.lines().filter_map(|line| line.split_once(' '));
+        told.map(|(topic, said)| (topic.rsplit('/').next().unwrap_or_default().to_owned(), said.to_owned()))
+            .collect()
     }
 
     fn mqtt(&self, short: &str) -> Said {
-        let (port, topic) = (self.broker.port.to_string(), format!("drived/drive/{short}"));
-        let told = Command::new("mosquitto_sub")
-            .args([
-                "-V",
-                "5",
-                "-p",
-                &port,
-                "-t",
-                &format!("{topic}/state"),
-                "-t",
-                &format!("{topic}/availability"),
-            ])
-            .args(["-C", "2", "-W", "3", "-F", "%t %p"])
-            .output()
-            .expect("it comes with mosquitto");
-        let told = String::from_utf8(told.stdout).expect("it is text");
-        let told: BTreeMap<&str, &str> = told.lines().filter_map(|line| line.split_once(' ')).collect();
-        let of = |what: &str| told.get(format!("{topic}/{what}").as_str()).copied().unwrap_or_default();
-        if of("availability") != "online" {
+        let kept = self.kept(short, &["state", "availability"]);
+        if kept.get("availability").map(String::as_str) != Some("online") {
             return Said::NOTHING;
         }
-        let state: Value = serde_json::from_str(of("state")).unwrap_or_default();
+        let state: Value =
+            kept.get("state").and_then(|state| serde_json::from_str(state).ok()).unwrap_or_default();
         live(&state["status"], &state["time_unix_ms"])
     }
 
@@ -309,12 +413,10 @@ impl Plant {
     /// Waits until every face says of a drive what it says itself, and that it is so now.
     fn agree(&mut self, step: &str, place: usize, state: Option<&str>) {
         let family = &FAMILIES[place];
-        let short = family.drive.split('@').next().unwrap_or_default();
-        let (id, topic, slot) = (format!("the {short}"), format!("the_{short}"), place as u16);
         let end = Instant::now() + PATIENCE;
         loop {
             let (before, begun) = (self.itself(family), now());
-            let faces = self.faces(&id, &topic, slot);
+            let faces = self.faces(place);
             let (after, ended) = (self.itself(family), now());
             let is_right = |face: &str, said: &Said| match state {
                 None => *said == Said::NOTHING,
@@ -325,75 +427,113 @@ impl Plant {
                         }
                         (said, state) => said == Some(state),
                     };
-                    // A host of Sparkplug has the time of the last change.
-                    let oldest = if face == "Sparkplug" { 0.0 } else { begun - OLDEST_S };
+                    // These have the time of the last change.
+                    let of_change = matches!(face, "Sparkplug" | "Home Assistant");
+                    let oldest = if of_change { 0.0 } else { begun - OLDEST_S };
                     let is_now = said.at.is_some_and(|at| (oldest..=ended + 0.2).contains(&at));
-                    (said.frequency, said.current) == after && is_state && is_now
+                    // A person is shown tenths.
+                    let tenths = |value: Option<i64>| value.map(|value| (value + 5) / 10);
+                    let is_same = match face {
+                        "page" => {
+                            tenths(said.frequency) == tenths(after.0)
+                                && tenths(said.current) == tenths(after.1)
+                        }
+                        _ => (said.frequency, said.current) == after,
+                    };
+                    is_same && is_state && is_now
                 }
             };
             // What moves between two looks shows nothing.
             let is_still = before == after && (state.is_none() || after.0.is_some());
             if is_still && faces.iter().all(|(face, said)| is_right(face, said)) {
-                let told = |said: &Said| match (&said.state, said.frequency, said.current, said.at) {
-                    (Some(state), frequency, current, at) => {
-                        let hertz = frequency
-                            .map_or("?".to_owned(), |hertz| format!("{:.2} Hz", hertz as f64 / 100.0));
-                        let amperes = current
-                            .map_or(String::new(), |amperes| format!(", {:.1} A", amperes as f64 / 100.0));
-                        let age =
-                            at.map_or(String::new(), |at| format!(", {:.1} s old", (ended - at).max(0.0)));
-                        format!("{state}, {hertz}{amperes}{age}")
-                    }
-                    _ => "nothing".to_owned(),
-                };
-                let told: Vec<String> = faces.iter().map(|(_, said)| told(said)).collect();
+                if !std::mem::replace(&mut self.has_head, true) {
+                    let heads: Vec<&str> = faces.iter().map(|(face, _)| *face).collect();
+                    println!("| Step | Drive | {} |\n|{}", heads.join(" | "), "---|".repeat(heads.len() + 2));
+                }
+                let told: Vec<String> = faces.iter().map(|(_, said)| told(said, ended)).collect();
                 println!("| {step} | {} | {} |", family.drive, told.join(" | "));
                 return;
             }
             assert!(
                 Instant::now() < end,
-                "{step}: {id} says {before:?}, {after:?}, expected {state:?}: {faces:#?}"
+                "{step}: {} says {before:?}, {after:?}, expected {state:?}: {faces:#?}",
+                family.drive
             );
         }
     }
 
     /// Waits until every face says of a slow value what the drive says itself.
-    fn agree_on_slow(&mut self, &(place, (register, count), key, (metric, unit), name): &Slow) {
-        let family = &FAMILIES[place];
-        let short = family.drive.split('@').next().unwrap_or_default();
-        let (id, end) = (format!("the {short}"), Instant::now() + PATIENCE);
+    fn agree_on_slow(&mut self, slow: &Slow) {
+        let family = &FAMILIES[slow.place];
+        let (id, short, end) =
+            (format!("the {}", short(family)), format!("the_{}", short(family)), Instant::now() + PATIENCE);
+        let (register, count) = slow.register;
         loop {
             let itself =
                 self.words(family.unit, register, 1).map(|words| hundredths(f64::from(words[0]) * count));
-            let state: Value =
-                serde_json::from_str(&get(self.http, "/api/v1/state", "*/*")).expect("it is JSON");
-            let drives = state["drives"].as_array().expect("a list");
-            let drive = drives.iter().find(|drive| drive["id"] == *id).cloned().unwrap_or_default();
-            let api = drive["measurements"][key].as_f64().map(hundredths);
-            let (port, topic) =
-                (self.broker.port.to_string(), format!("drived/drive/the_{short}/measurements"));
-            let told = Command::new("mosquitto_sub")
-                .args(["-V", "5", "-p", &port, "-t", &topic, "-C", "1", "-W", "3"])
-                .output()
-                .expect("it comes with mosquitto");
-            let told: Value = serde_json::from_slice(&told.stdout).unwrap_or_default();
-            let mqtt = told[key].as_f64().map(hundredths);
+            let number = |value: &Value| value.as_f64().map(hundredths);
+            let api = self.drive(&id).and_then(|(drive, _)| number(&drive["measurements"][slow.api]));
+            let kept = self.kept(&short, &["measurements"]);
+            let kept = kept.get("measurements").and_then(|told| serde_json::from_str::<Value>(told).ok());
             let all = self.host.ask();
-            let sparkplug = all[&id][format!("Measurements/{name}")][0].as_f64().map(hundredths);
             let text = get(self.http, "/metrics", "*/*");
-            let series = format!("drived_drive_{metric}{{line=\"bench\",drive=\"{id}\"}} ");
+            let series = format!("drived_drive_{}{{line=\"bench\",drive=\"{id}\"}} ", slow.prometheus.0);
             let scraped = text.lines().find_map(|line| line.strip_prefix(&series)?.parse::<f64>().ok());
-            let prometheus = scraped.map(|value| hundredths(value * unit));
-            if itself.is_some() && [api, mqtt, sparkplug, prometheus].iter().all(|said| *said == itself) {
+            let mut said = vec![
+                ("API", api),
+                ("MQTT", kept.and_then(|told| number(&told[slow.api]))),
+                ("Sparkplug", number(&all[&id][format!("Measurements/{}", slow.sparkplug)][0])),
+                ("Prometheus", scraped.map(|value| hundredths(value * slow.prometheus.1))),
+            ];
+            if let (Some(home), Some(entity)) = (&mut self.home, slow.home) {
+                let state = home.entity(&format!("sensor.{short}_{entity}"))["state"].take();
+                let state = state.as_str().and_then(|state| state.parse().ok());
+                said.push(("Home Assistant", state.map(hundredths)));
+            }
+            if let Some(page) = &mut self.page {
+                let shown = page.shows(&format!("drive {id}"))[slow.page].take();
+                let unit = if slow.api.ends_with("percent") { "%" } else { "V" };
+                let shown = shown.as_str().and_then(|text| read(text, unit)).map(hundredths);
+                // It shows whole units: the same, rounded.
+                let is_it = shown == itself.map(|value| (value + 50) / 100 * 100);
+                said.push(("page", if is_it { itself } else { shown }));
+            }
+            if itself.is_some() && said.iter().all(|(_, said)| *said == itself) {
                 let value = itself.unwrap_or_default() as f64 / 100.0;
+                let faces: Vec<&str> = said.iter().map(|(face, _)| *face).collect();
                 println!(
-                    "| they run | {} | {key} {value}: the same of API, MQTT, Sparkplug and Prometheus |||||",
-                    family.drive
+                    "| they run | {} | {} {value}: the same at {} |",
+                    family.drive,
+                    slow.api,
+                    faces.join(", ")
                 );
                 return;
             }
-            let said = [("API", api), ("MQTT", mqtt), ("Sparkplug", sparkplug), ("Prometheus", prometheus)];
-            assert!(Instant::now() < end, "{id} says {key} {itself:?}: {said:?}");
+            assert!(Instant::now() < end, "{id} says {} {itself:?}: {said:?}", slow.api);
+        }
+    }
+
+    /// Waits until the page tells of a drive that is lost how old its last status is, as the API does.
+    fn agree_on_age(&mut self, place: usize) {
+        let Some(page) = &mut self.page else { return };
+        let (name, end) = (self.names[place].clone(), Instant::now() + PATIENCE);
+        loop {
+            let row = page.shows("rows")[&name].take();
+            let text = row["age"].as_str().unwrap_or_default();
+            let shown = text.strip_suffix(" old").and_then(seconds);
+            let state: Value =
+                serde_json::from_str(&get(self.http, "/api/v1/state", "*/*")).expect("it is JSON");
+            let mut drives = state["drives"].as_array().into_iter().flatten();
+            let told = drives.find(|drive| drive["name"] == *name).expect("it is there");
+            let age = told["status"]["age_ms"].as_f64().expect("it has answered once") / 1_000.0;
+            // It counts on once a second, and what lies between the two looks is time.
+            if row["quality"] == "stale"
+                && shown.is_some_and(|shown| (age - OLDEST_S..=age + 1.0).contains(&shown))
+            {
+                println!("| one is lost | {name} | {age:.1} s old by the API, and the page says: {text} |");
+                return;
+            }
+            assert!(Instant::now() < end, "{name} is {age} s old, and the page says {row}");
         }
     }
 
@@ -402,6 +542,44 @@ impl Plant {
             self.agree(step, place, state);
         }
     }
+}
+
+/// What somebody has said, in a cell.
+fn told(said: &Said, now: f64) -> String {
+    let Some(state) = &said.state else { return "nothing".to_owned() };
+    let hertz = said.frequency.map_or("?".to_owned(), |hertz| format!("{:.2} Hz", hertz as f64 / 100.0));
+    let amperes = said.current.map_or(String::new(), |amperes| format!(", {:.1} A", amperes as f64 / 100.0));
+    let age = said.at.map_or(String::new(), |at| format!(", {:.1} s old", (now - at).max(0.0)));
+    format!("{state}, {hertz}{amperes}{age}")
+}
+
+/// What a row of the overview shows as of now; what is old is grey there, with its age.
+fn page_of(row: &Value) -> Said {
+    if row["quality"] != "good" || row["age"] != "live" {
+        return Said::NOTHING;
+    }
+    let text = |cell: &str| row[cell].as_str().unwrap_or_default();
+    Said {
+        frequency: read(text("frequency"), "Hz").map(hundredths),
+        current: read(text("current"), "A").map(hundredths),
+        // The words of the API, as a person reads them.
+        state: Some(text("state").to_lowercase().replace(' ', "_")),
+        at: Some(now()),
+    }
+}
+
+/// What the entities of a drive are at Home Assistant; a value that is not told again in time is none there.
+fn home_of(home: &mut HomeAssistant, entities: &str) -> Said {
+    let state = home.entity(&format!("sensor.{entities}_state"));
+    let known = state["state"].as_str().filter(|state| !["-", "unavailable", "unknown"].contains(state));
+    let mut number = |what: &str, unit: &str| {
+        let entity = home.entity(&format!("sensor.{entities}_{what}"));
+        let value = entity["state"].as_str()?.parse().ok()?;
+        assert_eq!(entity["attributes"]["unit_of_measurement"], unit, "{entity}");
+        Some(hundredths(value))
+    };
+    let (frequency, current) = (number("frequency", "Hz"), number("current", "A"));
+    Said { frequency, current, state: known.map(str::to_owned), at: known.and(state["at"].as_f64()) }
 }
 
 /// What a status of the API says, where it is one of now.
@@ -420,7 +598,7 @@ fn live(status: &Value, time_unix_ms: &Value) -> Said {
 
 fn configure(folder: &Path, (link, broker, http, gateway): (&str, u16, u16, u16), names: &[String; 5]) {
     let mut text = format!(
-        "state = \"state\"\n[http]\nlisten = \"127.0.0.1:{http}\"\n[mqtt]\nservers = [\"mqtt://127.0.0.1:{broker}\"]\nheartbeat = \"1s\"\n\
+        "state = \"state\"\n[http]\nlisten = \"127.0.0.1:{http}\"\n[mqtt]\nservers = [\"mqtt://127.0.0.1:{broker}\"]\nheartbeat = \"1s\"\ndiscovery = \"device\"\n\
          [mqtt.sparkplug]\ngroup = \"plant\"\nedge_node = \"hall 1\"\n\
          [[gateways]]\nlisten = \"127.0.0.1:{gateway}\"\nvirtual_unit = 247\nunits = {{ "
     );
@@ -439,9 +617,6 @@ fn configure(folder: &Path, (link, broker, http, gateway): (&str, u16, u16, u16)
 #[test]
 fn every_face_tells_what_the_drives_say_while_they_move_trip_are_renamed_lost_and_gone() {
     let Some(mut plant) = Plant::start() else { return };
-    println!(
-        "| Step | Drive | API | MQTT | Sparkplug | Prometheus | Virtual unit |\n|---|---|---|---|---|---|---|"
-    );
     for (name, hertz) in plant.names.clone().iter().zip(["10Hz", "15Hz", "20Hz", "25Hz", "30Hz"]) {
         plant.start_motor(name, hertz);
     }
@@ -450,12 +625,18 @@ fn every_face_tells_what_the_drives_say_while_they_move_trip_are_renamed_lost_an
         plant.agree_on_slow(slow);
     }
 
-    // Another name: the same device, series, topic and place. Its motor, started here, was stopped as the drive of the old name left.
+    // Another name: the same device, series, topic and place, and the motor turns on.
     plant.names[1] = "the mixer".to_owned();
     plant.reload();
-    let states = [Some("running"), Some("at rest"), Some("running"), Some("running"), Some("running")];
-    plant.all_agree("one is called otherwise", states);
-    plant.start_motor("the mixer", "15Hz");
+    plant.all_agree("one is called otherwise", [Some("running"); 5]);
+    // Its counters go on with it, those of its commands too: it was started by the name that it had, and stopped by nobody.
+    let text = get(plant.http, "/metrics", "*/*");
+    let of_it = text
+        .lines()
+        .filter(|line| line.starts_with("drived_commands_total{") && line.contains("drive=\"the atv28\""));
+    let actions: Vec<&str> =
+        of_it.filter_map(|line| line.split("action=\"").nth(1)?.split('"').next()).collect();
+    assert!(!actions.is_empty() && actions.iter().all(|action| *action == "start"), "{actions:?}: {text}");
 
     plant.sim.say("atv312@1 trip OCF", "done");
     plant.all_agree(
@@ -465,6 +646,8 @@ fn every_face_tells_what_the_drives_say_while_they_move_trip_are_renamed_lost_an
 
     plant.sim.say("atv58@3 power off", "done");
     plant.all_agree("one is lost", [Some("fault"), Some("running"), None, Some("running"), Some("running")]);
+
+    plant.agree_on_age(2);
 
     let gone = std::mem::take(&mut plant.names[3]);
     plant.reload();
@@ -476,6 +659,10 @@ fn every_face_tells_what_the_drives_say_while_they_move_trip_are_renamed_lost_an
     // Who was stopped as he left stands, and so does who had no power.
     let states = [Some("fault"), Some("running"), Some("at rest"), Some("at rest"), Some("running")];
     plant.all_agree("both are back", states);
+    plant.page.take().into_iter().for_each(Page::close);
+    if let Some(mut home) = plant.home.take() {
+        assert_eq!(home.complaints(), Vec::<String>::new());
+    }
     assert_eq!(plant.daemon.interrupt().0, Some(0));
     fs::remove_dir_all(&plant.folder).expect("it is there");
 }

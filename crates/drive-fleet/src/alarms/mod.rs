@@ -12,7 +12,7 @@
 //!   moves or may ([`AlarmKind::is_of_motion`]) cannot be shelved: nobody shall stand beside a machine whose alarm another has put
 //!   aside. For the same reason such an alarm is never suppressed by one that is shelved, and who has acknowledged its cause before it
 //!   came is told anew.
-//! - A drive or line that leaves the configuration leaves its alarms as **gone**, to be acknowledged once.
+//! - A drive that is called otherwise keeps its alarms ([`rename`](Alarms::rename)). A drive or line that leaves the configuration leaves its alarms as **gone**, to be acknowledged once.
 //! - Of alarms that have returned the newest 500 are kept; that older ones were dropped is counted and told. Those that are so are as
 //!   many as there are drives and kinds.
 //!
@@ -208,6 +208,21 @@ impl Alarms {
         let change = life::unshelve(alarm);
         self.alarms.retain(|alarm| !alarm.is_over);
         Ok(vec![change])
+    }
+
+    /// A drive is called otherwise: its alarms are the same, and go with it. What was seen of it by the new name alone is the same once
+    /// more.
+    pub fn rename(&mut self, old: &str, new: &str) {
+        let of_old: Vec<AlarmKind> = self.of_drive(old).map(|alarm| alarm.kind).collect();
+        let is_twice = |alarm: &Alarm| alarm.drive.as_deref() == Some(new) && of_old.contains(&alarm.kind);
+        self.alarms.retain(|alarm| !is_twice(alarm));
+        for alarm in self.alarms.iter_mut().filter(|alarm| alarm.drive.as_deref() == Some(old)) {
+            alarm.drive = Some(new.to_owned());
+        }
+    }
+
+    fn of_drive<'a>(&'a self, drive: &'a str) -> impl Iterator<Item = &'a Alarm> {
+        self.alarms.iter().filter(move |alarm| alarm.drive.as_deref() == Some(drive))
     }
 
     fn get_mut(&mut self, id: u64) -> Result<&mut Alarm, AlarmRefused> {

@@ -251,6 +251,10 @@ impl Supervisor {
 
     /// Other settings hold from now on. The motor, the orders and the stops under way go on.
     pub(crate) fn handle_settings(&mut self, now: Instant, settings: &DriveSettings) {
+        if *self.name != *settings.name {
+            let old = std::mem::replace(&mut self.name, Arc::from(settings.name.as_str()));
+            self.emit_by(EventKind::Renamed(old), Cause::policy(Policy::Settings));
+        }
         let changed = self.settings.differ(settings);
         if !changed.is_empty() {
             self.emit_by(EventKind::Reconfigured(changed), Cause::policy(Policy::Settings));

@@ -369,6 +369,7 @@ fn every_kind() -> Vec<EventKind> {
             present: false,
         },
         EventKind::Reconfigured(vec!["periods"]),
+        EventKind::Renamed(Arc::from("pump 1")),
         EventKind::Exit(ExitAction::Stopped(unknown)),
         EventKind::Exit(ExitAction::TimeOver),
         EventKind::Removed(ExitAction::Left),

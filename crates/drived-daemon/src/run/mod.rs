@@ -141,6 +141,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     opened.tell(&config.lines);
     let by_profile = opened.clone().follow(plant.clone(), doors.audit(), fleet.events());
     let by_profile = tokio::spawn(by_profile);
+    let known = names.clone();
     let faces = Faces::open(faces, Surroundings::new(plant.clone(), doors.audit(), names.clone()));
     let shutdown = config.shutdown;
     let beginning = config.lines.is_empty().then(|| args.config.clone());
@@ -154,7 +155,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let sources: Vec<Arc<dyn Source>> = vec![Arc::new(reloader.clone()), Arc::new(faces.clone())];
     let doors = doors.open(metrics::serve(router, plant.clone(), sources), api::stops());
     plant.follow_audit(doors.audit().failing());
-    let audited = doors.follow(fleet.events());
+    let audited = doors.follow(known, fleet.events());
     let watching = notify.watch(fleet.clone(), doors.listening());
     let screen = with_table.then(|| table(plant.clone())).flatten();
     // Below the table: what was said before it is behind it.

@@ -116,7 +116,7 @@ impl Reloader {
         // Nobody asks for a drive that is not there yet.
         plant.set_options(super::options(&new.lines));
         let made = add_all(&fleet, &changes, &new, &lines, &mut leavings)
-            .map(|()| settle(&fleet, config, &mut new, &changes));
+            .map(|()| settle(plant, config, &mut new, &changes));
         *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner) = leavings;
         // Also where nothing has changed: what is kept may have been mended.
         super::tell_names(&self.0.names, &config.lines, &config.groups);
@@ -272,7 +272,7 @@ impl Reload for Reloader {
     /// Reads the file and does what has changed in it, or with `dry_run` only says what that would be: one sentence each. The
     /// whole file is read and checked first.
     ///
-    /// A drive whose settings alone have changed keeps its task, its snapshot and its motor. One that is removed, or whose
+    /// A drive whose settings or whose name alone have changed keeps its task, its snapshot and its motor. One that is removed, or whose
     /// line, address, family or options have changed, ends by its policy, as at the exit.
     ///
     /// # Errors
@@ -360,36 +360,47 @@ fn add_all(
 /// Gives the drives their new settings, and makes the lines of `config` those that there are now. What holds from the next
 /// start on stays in it as it was. Gives why settings were not taken, and by whom.
 fn settle(
-    fleet: &Fleet,
+    plant: &Plant,
     config: &mut Config,
     new: &mut Config,
     changes: &[Change],
 ) -> Option<(String, Vec<String>)> {
+    let fleet = plant.fleet();
     let mut refused: Vec<(String, FleetError)> = Vec::new();
+    for (old, settings) in changes.iter().filter_map(Change::renamed) {
+        match fleet.rename(old, settings.clone()) {
+            Ok(()) => plant.renamed(old, &settings.name),
+            Err(error) => refused.push((settings.name.clone(), error)),
+        }
+    }
     for settings in changes.iter().filter_map(Change::settings) {
         if let Err(error) = fleet.reconfigure(settings.clone()) {
             refused.push((settings.name.clone(), error));
         }
     }
+    let called_before = |name: &str| {
+        let mut renamed = changes.iter().filter_map(Change::renamed);
+        renamed.find_map(|(old, settings)| (settings.name == name).then_some(old))
+    };
     let mut before = std::mem::replace(&mut config.lines, std::mem::take(&mut new.lines));
     for line in &mut config.lines {
         let Some(old) = before.iter_mut().find(|old| old.name == line.name) else { continue };
         line.budget = old.budget;
         for drive in &mut line.drives {
-            let same = |old: &&DrivePart| old.settings.name == drive.settings.name && old.name == drive.name;
-            if let Some(old) = old.drives.iter().find(same) {
+            let name = &drive.settings.name;
+            let name = called_before(name).unwrap_or(name);
+            let Some(old) = old.drives.iter().find(|old| old.settings.name == name) else { continue };
+            if old.name == drive.name {
                 // One that was not exchanged goes on by the profile with which it was opened.
                 drive.name = old.name;
             }
-            if refused.iter().any(|(name, _)| *name == drive.settings.name)
-                && let Some(old) = old.drives.iter().find(|old| old.settings.name == drive.settings.name)
-            {
+            if refused.iter().any(|(name, _)| *name == drive.settings.name) {
                 drive.settings = old.settings.clone();
             }
         }
     }
     let (_, why) = refused.first()?;
-    let half = |change: &Change| match change.settings() {
+    let half = |change: &Change| match change.settings().or(change.renamed().map(|(_, settings)| settings)) {
         Some(settings) if refused.iter().any(|(name, _)| *name == settings.name) => change.half(),
         _ => Some(change.to_string()),
     };

@@ -31,8 +31,11 @@ pub use self::{
     show::{Filter, Found, shown},
     verify::{Verdict, verify_since},
 };
-use drived_config::kept::Kept;
-use drived_config::rights::{Caller, Rights};
+use drived_config::{
+    kept::Kept,
+    names::{self, Names},
+    rights::{Caller, Rights},
+};
 
 /// Records that wait for the disk.
 const WAITING: usize = 256;
@@ -79,6 +82,9 @@ pub struct Record {
     pub origin: String,
     /// In words, or method and path of a request.
     pub what: String,
+    /// The id of the drive that it is about, where it is one: it keeps that whatever it is called.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drive: Option<String>,
     /// What the request said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub body: Option<serde_json::Value>,
@@ -101,6 +107,7 @@ impl Record {
             caller: name,
             origin,
             what: masked(&what.into()),
+            drive: None,
             body: None,
             id: None,
             outcome: None,
@@ -239,7 +246,7 @@ impl Written {
 }
 
 /// Writes what becomes of each command at its drive until the fleet ends: also of one whose caller did not wait for it.
-pub(super) async fn follow(audit: Audit, mut events: Events) {
+pub(super) async fn follow(audit: Audit, names: Names, mut events: Events) {
     loop {
         let Event { drive, kind, .. } = match events.recv().await {
             Received::Event(event) => event,
@@ -264,7 +271,9 @@ pub(super) async fn follow(audit: Audit, mut events: Events) {
             _ => continue,
         };
         let caller = Caller::new(caller, "fleet", Rights::ALL);
-        let record = Record { outcome: Some(outcome), ..Record::new(Kind::Outcome, &caller, what) };
+        let id = Some(names.known_as(names::Kind::Drive, &drive).id);
+        let record =
+            Record { drive: id, outcome: Some(outcome), ..Record::new(Kind::Outcome, &caller, what) };
         // Where it cannot be written that is told by whoever writes.
         let _ = audit.record(record).done().await;
     }

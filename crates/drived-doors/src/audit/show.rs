@@ -20,7 +20,7 @@ pub struct Filter {
     pub since_unix_ms: Option<u64>,
     pub until_unix_ms: Option<u64>,
     pub caller: Option<String>,
-    /// A part of what was asked for, such as the name of a drive.
+    /// A part of what was asked for, such as the name that a drive had, or the id of a drive.
     pub about: Option<String>,
     /// What somebody might not do, instead of what was done.
     pub refused: bool,
@@ -40,6 +40,8 @@ pub struct Found {
     #[serde(default)]
     pub what: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drive: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body: Option<Value>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outcome: Option<String>,
@@ -55,7 +57,9 @@ impl Filter {
         self.since_unix_ms.is_none_or(|since| time >= since)
             && self.until_unix_ms.is_none_or(|until| time < until)
             && self.caller.as_ref().is_none_or(|caller| *caller == found.caller)
-            && self.about.as_ref().is_none_or(|about| found.what.contains(about.as_str()))
+            && self.about.as_ref().is_none_or(|about| {
+                found.what.contains(about.as_str()) || found.drive.as_ref() == Some(about)
+            })
     }
 }
 
@@ -126,6 +130,7 @@ mod tests {
             outcome: Some("confirmed".to_owned()),
             status: Some(200),
             id: Some("c-1".to_owned()),
+            drive: Some("pump 1".to_owned()),
             ..Record::of_program(Kind::Command, "POST /api/v1/stop")
         };
         let line = Line { number: 7, time_unix_ms: 100, record: &record, previous: "00" };

@@ -44,8 +44,8 @@ pub fn dashboard() -> Value {
         "timezone": "browser",
         "templating": { "list": [
             variable("instance", "Host", "label_values(drived_build_info, instance)"),
-            variable("line", "Line", r#"label_values(drived_line_up{instance=~"$instance"}, line)"#),
-            variable("drive", "Drive", &format!("label_values(drived_drive_up{{{LINES}}}, drive)")),
+            named("line", "Line", r#"query_result(drived_line_info{instance=~"$instance"})"#),
+            named("drive", "Drive", &format!("query_result(drived_drive_info{{{LINES}}})")),
         ] },
         "annotations": { "list": [{
             "name": "Trips",
@@ -249,6 +249,14 @@ fn variable(name: &str, label: &str, query: &str) -> Value {
         "allValue": ".*",
         "current": { "text": ["All"], "value": ["$__all"] },
     })
+}
+
+/// One whose choices are shown by what they are called now, and chosen by their ids, which the series have. Grafana takes both from the
+/// text of each series, where its labels stand in any order.
+fn named(label: &str, shown: &str, query: &str) -> Value {
+    let mut variable = variable(label, shown, query);
+    variable["regex"] = format!(r#"/[{{,]{label}="(?<value>[^"]+)|[{{,]name="(?<text>[^"]+)/g"#).into();
+    variable
 }
 
 fn target(letter: char, query: &str, legend: &str) -> Value {

@@ -80,9 +80,9 @@ pub(super) fn collect_commands(
     samples: &mut Samples,
 ) {
     for (command, count) in &counts.commands {
-        if let Some((id, _)) = drives.iter().find(|(_, drive)| **drive.name() == *command.drive) {
+        if drives.iter().any(|(id, _)| *id == command.drive) {
             let outcome = command.outcome.to_string();
-            let labels = [line, id, command.action.name(), &outcome, &command.face];
+            let labels = [line, &command.drive, command.action.name(), &outcome, &command.face];
             samples.count(Id::Commands, &labels, *count);
         }
     }

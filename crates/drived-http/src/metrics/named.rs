@@ -116,6 +116,36 @@ fn every_metric_and_label_of_the_board_is_in_the_table() {
     }
 }
 
+/// As Grafana makes the choices of `query_result`: its source of Prometheus writes each series as a text, and the first match of each of
+/// both groups is taken (`metricNamesToVariableValues`).
+#[test]
+fn a_drive_and_a_line_are_chosen_by_what_they_are_called_and_meant_by_their_ids() {
+    let board = dashboard();
+    let of = |name: &str| {
+        let all = board["templating"]["list"].as_array().unwrap();
+        let variable = all.iter().find(|variable| variable["name"] == name).unwrap();
+        let regex =
+            variable["regex"].as_str().unwrap().strip_prefix('/').unwrap().strip_suffix("/g").unwrap();
+        regex::Regex::new(regex).unwrap()
+    };
+    let drive = r#"{address="2",drive="pump 2",family="atv28",instance="a:7580",line="north",name="mixer"} 1 1790000000000"#;
+    let turned = r#"{name="mixer",line="north",drive="pump 2",instance="a:7580"} 1 1790000000000"#;
+    for (variable, series, value, text) in [
+        ("drive", format!("drived_drive_info{drive}"), "pump 2", "mixer"),
+        ("drive", format!("drived_drive_info{turned}"), "pump 2", "mixer"),
+        (
+            "line",
+            r#"drived_line_info{line="north",name="hall 1",protocol="rtu"} 1 1790000000000"#.to_owned(),
+            "north",
+            "hall 1",
+        ),
+    ] {
+        let regex = of(variable);
+        let first = |group| regex.captures_iter(&series).find_map(|found| Some(found.name(group)?.as_str()));
+        assert_eq!((first("value"), first("text")), (Some(value), Some(text)), "{series}");
+    }
+}
+
 #[test]
 fn the_panels_of_the_board_have_a_place_each_and_an_id_each() {
     let board = dashboard();

@@ -104,6 +104,14 @@ impl History {
         }
     }
 
+    /// A drive is called otherwise.
+    pub(super) fn rename(&self, old: &str, new: &str) {
+        let mut rings = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(ring) = rings.drives.remove(old) {
+            rings.drives.insert(Arc::from(new), ring);
+        }
+    }
+
     pub(super) fn curves(&self) -> CurvesView {
         let rings = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let drives = rings.drives.iter().map(|(name, ring)| {

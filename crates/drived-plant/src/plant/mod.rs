@@ -274,6 +274,12 @@ impl Plant {
         Some(SettingsView::of(&drive, plan))
     }
 
+    /// A drive of the fleet is called otherwise from now on: what is known of it is known of it by the new name.
+    pub fn renamed(&self, old: &str, new: &str) {
+        self.0.history.rename(old, new);
+        self.rename_alarms(old, new);
+    }
+
     /// The last ten minutes of a drive.
     pub fn history(&self, name: &str, since_unix_ms: Option<u64>) -> Option<HistoryView> {
         self.0.fleet.drive(name).map(|_| self.0.history.of(name, since_unix_ms))

@@ -40,6 +40,7 @@ pub struct Counts {
 /// A command to one drive, as it is counted.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Ended {
+    /// The id of the drive, which it keeps whatever it is called.
     pub drive: String,
     pub action: ActionWord,
     pub outcome: OutcomeWord,
@@ -48,10 +49,10 @@ pub struct Ended {
 }
 
 impl Tally {
-    /// Counts a command to one drive that has ended.
-    pub(super) fn count(&self, command: &CommandView) {
+    /// Counts a command that has ended to the drive of this id.
+    pub(super) fn count(&self, drive: String, command: &CommandView) {
         let face = command.origin.split(' ').next().unwrap_or_default().to_owned();
-        let (drive, action) = (command.drive.clone().unwrap_or_default(), command.action);
+        let action = command.action;
         let mut counts = self.lock();
         *counts.commands.entry(Ended { drive, action, outcome: command.outcome, face }).or_default() += 1;
         if action == ActionWord::Stop && command.outcome == OutcomeWord::Confirmed {

@@ -6,6 +6,7 @@ things). Nothing of it is replaced.
 usage: home_assistant.py FOLDER PORT OWN-PORT      the port of the broker, and one for its own server
 
     wait ENTITY STATE     waits until an entity is in this state: its attributes; `-` for none: until there is no such entity
+    entity ENTITY         an entity as it is now: state, attributes, and when that came; `-` for none
     states                every entity with its state
     named ENTITY NAME     waits until the device of an entity has this name
     forget                what follows begins here
@@ -131,6 +132,11 @@ async def answer(hass, word, words):
     match word, words:
         case "wait", [entity, wanted]:
             return await wait(hass, entity, wanted)
+        case "entity", [entity]:
+            now = hass.states.get(entity)
+            if now is None:
+                return {"state": "-"}
+            return {"state": now.state, "attributes": dict(now.attributes), "at": now.last_updated.timestamp()}
         case "states", []:
             return {state.entity_id: state.state for state in hass.states.async_all()}
         case "named", [entity, *name]:

@@ -303,3 +303,19 @@ fn what_is_noted_has_its_bounds() {
     }
     assert_eq!(states(&alarms), [(AlarmKind::AuditLog, AlarmState::Unacknowledged)]);
 }
+
+#[test]
+fn a_drive_that_is_called_otherwise_keeps_its_alarms_with_their_notes() {
+    let mut alarms = Alarms::default();
+    alarms.look(&[pump(&[TRIPPED])], 10);
+    let id = alarms.all()[0].id;
+    alarms.acknowledge(id, "anna", Some("belt"), 20).unwrap();
+    let mixer = look(Some("mixer"), Some("north"), &[TRIPPED]);
+    // Somebody may have looked at it by its new name already.
+    alarms.look(std::slice::from_ref(&mixer), 30);
+    alarms.rename("pump 1", "mixer");
+    look_at_all(&mut alarms, &[mixer], HOUR);
+    let [alarm] = alarms.all() else { panic!("{alarms:?}") };
+    assert_eq!((alarm.id, alarm.count, alarm.drive.as_deref()), (id, 1, Some("mixer")));
+    assert_eq!(alarm.state(), AlarmState::Acknowledged);
+}

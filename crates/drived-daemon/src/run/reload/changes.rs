@@ -22,6 +22,8 @@ pub(super) enum Change {
     DriveExchanged(String, &'static str),
     /// Its settings are others.
     DriveChanged(Box<DriveSettings>),
+    /// It is called otherwise, which is the old name: by these settings. It is the same drive at the same place.
+    DriveRenamed(String, Box<DriveSettings>),
     /// The file of its profile says something else: the drive goes on by what it was opened with.
     ProfileLater(String),
     Groups,
@@ -68,6 +70,14 @@ impl Change {
         }
     }
 
+    /// The old name, and the settings with the new one.
+    pub(super) fn renamed(&self) -> Option<(&str, &DriveSettings)> {
+        match self {
+            Self::DriveRenamed(old, settings) => Some((old, settings)),
+            _ => None,
+        }
+    }
+
     pub(super) fn opened_face(&self) -> Option<&str> {
         match self {
             Self::FaceOpened(table) | Self::FaceChanged(table) => Some(table),
@@ -97,6 +107,9 @@ impl Change {
                 format!("{name} ended by its policy of the exit and NOT begun anew")
             }
             Self::DriveChanged(settings) => format!("{} goes on with its OLD settings", settings.name),
+            Self::DriveRenamed(old, settings) => {
+                format!("{old} is NOT called {}, and goes on as it was", settings.name)
+            }
             Self::LineRemoved(_)
             | Self::DriveRemoved(_)
             | Self::Groups
@@ -130,6 +143,9 @@ impl fmt::Display for Change {
                 write!(f, "{name} ended by its policy of the exit and begun anew, because {why}")
             }
             Self::DriveChanged(settings) => write!(f, "{} has other settings and goes on", settings.name),
+            Self::DriveRenamed(old, settings) => {
+                write!(f, "{old} is called {} now, and goes on", settings.name)
+            }
             Self::ProfileLater(name) => write!(f, "the profile of {name}: from the next start on"),
             Self::Groups => write!(f, "groups changed"),
             Self::FaceOpened(table) => write!(f, "{table} opened"),
@@ -156,9 +172,17 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
     let added = new.lines.iter().filter(|part| line(old, &part.name).is_none());
     changes.extend(added.map(|part| Change::LineAdded(part.name.clone())));
     let (before, after) = (drives(old), drives(new));
+    let renamed = renamed(&before, &after, &changes);
     for (name, (line, drive)) in &before {
         let Some((other_line, other)) = after.get(name) else {
-            changes.push(Change::DriveRemoved((*name).to_owned()));
+            let Some(other) = renamed.get(name) else {
+                changes.push(Change::DriveRemoved((*name).to_owned()));
+                continue;
+            };
+            changes.push(Change::DriveRenamed((*name).to_owned(), Box::new(other.settings.clone())));
+            if drive.name.family.revision() != other.name.family.revision() {
+                changes.push(Change::ProfileLater(other.settings.name.clone()));
+            }
             continue;
         };
         let exchanged = match () {
@@ -183,7 +207,8 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
             changes.push(Change::ProfileLater((*name).to_owned()));
         }
     }
-    let added = after.keys().filter(|name| !before.contains_key(*name));
+    let is_renamed = |name: &str| renamed.values().any(|other| other.settings.name == name);
+    let added = after.keys().filter(|name| !before.contains_key(*name) && !is_renamed(name));
     changes.extend(added.map(|name| Change::DriveAdded((*name).to_owned())));
     let budgets = |config: &Config| -> BTreeMap<String, _> {
         config.lines.iter().map(|line| (line.name.clone(), line.budget)).collect()
@@ -215,6 +240,29 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
         changes.extend(is_other.then_some(Change::Later(what)));
     }
     changes
+}
+
+/// Who is called otherwise, by the old names: the same family at the same address of a line that stays, of which nothing has changed for
+/// which a drive ends and begins anew. Both names mean no other drive, before and after.
+fn renamed<'a>(
+    before: &BTreeMap<&'a str, (&LinePart, &DrivePart)>,
+    after: &BTreeMap<&str, (&LinePart, &'a DrivePart)>,
+    changes: &[Change],
+) -> BTreeMap<&'a str, &'a DrivePart> {
+    let gone = before.iter().filter(|(name, _)| !after.contains_key(*name));
+    let stays =
+        gone.filter(|(_, (line, _))| !changes.iter().any(|change| change.closed_line() == Some(&line.name)));
+    let now = |(name, (line, drive)): (&&'a str, &(&LinePart, &DrivePart))| {
+        let new = after.iter().filter(|(name, _)| !before.contains_key(*name));
+        let mut same = new.filter(|(_, (other_line, other))| {
+            line.name == other_line.name
+                && drive.name == other.name
+                && drive.options == other.options
+                && (other.settings.control || !drive.settings.control)
+        });
+        same.next().map(|(_, (_, other))| (*name, *other))
+    };
+    stays.filter_map(now).collect()
 }
 
 /// Whether a line has to be opened anew. The pauses of its drives come and go with them.

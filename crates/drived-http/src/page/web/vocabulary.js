@@ -142,6 +142,7 @@ const WORDS = {
   exit: ['Exit', 'Fin du service'],
   removed: ['Removed', 'Retiré'],
   reconfigured: ['Settings changed', 'Réglages modifiés'],
+  renamed: ['Called otherwise', 'Renommé'],
   reload: ['Reload', 'Rechargement'],
   clock_stepped: ['Clock stepped', 'Horloge recalée'],
   audit_log: ['Audit log', 'Journal d’audit'],

@@ -148,6 +148,12 @@ impl Plant {
         Ok(after.unwrap_or(before))
     }
 
+    /// A drive is called otherwise.
+    pub(super) fn rename_alarms(&self, old: &str, new: &str) {
+        self.0.alarms.lock().rename(old, new);
+        self.0.alarms.changed.send_modify(|times| *times += 1);
+    }
+
     /// Ends the looking, for the program ends, and what is to be seen from now on is its own doing; what is kept is written.
     pub fn close_alarms(&self) {
         self.0.alarms.is_closed.send_replace(true);

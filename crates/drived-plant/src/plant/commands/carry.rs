@@ -26,7 +26,7 @@ use crate::plant::{
     Plant,
     views::{CommandView, SeveralView, Shown},
 };
-use drived_config::rights::Caller;
+use drived_config::{names::Kind, rights::Caller};
 use drived_words::json::{milliseconds, unix};
 
 /// Outcomes of several drives that come within this time are told together.
@@ -304,7 +304,8 @@ impl Work {
             part.stop = outcome.and_then(Outcome::stop).map(StopModesView::from).or(part.stop.take());
             part.started = outcome.and_then(Outcome::started).or(part.started);
             if is_first {
-                self.0.plant.tally().count(part);
+                let id = self.0.plant.known_as(Kind::Drive, member.name()).id;
+                self.0.plant.tally().count(id, part);
             }
         }
         drop(parts);
