@@ -255,8 +255,9 @@ export function useWords(word) {
 const PATTERNS = [
   [/^this is the port of line "(.+)", whose drives are asked there already: a scan would disturb them$/, line => `ce port est celui de la ligne « ${line} », dont les variateurs y sont déjà interrogés : une recherche les gênerait`],
   [/^another scan is under way: give it up first$/, () => 'une autre recherche est en cours : abandonnez-la d’abord'],
-  [/^this port is being scanned: wait for it, or give the scan up$/, () => 'ce port est en cours de recherche : attendez-en la fin, ou abandonnez-la'],
+  [/^the port of line "(.+)" is being scanned: wait for it, or give the scan up$/, line => `le port de la ligne « ${line} » est en cours de recherche : attendez-en la fin, ou abandonnez-la`],
   [/^(.+) has a run command of this daemon, or a stop that is not confirmed: it could not be stopped from here any more\. Stop it first$/, drive => `${drive} a un ordre de marche de ce service, ou un arrêt non confirmé : on ne pourrait plus l’arrêter d’ici. Arrêtez-le d’abord`],
+  [/^somebody else has begun to ask on this line, and the scan has ended: end his asking first, then scan again$/, () => 'quelqu’un d’autre s’est mis à interroger cette ligne, et la recherche a pris fin : mettez fin à ses questions, puis cherchez de nouveau'],
   [/^somebody else asks on this line: (\d+) requests in (.+?)\. This scan disturbs him, and he it: end his asking first, then scan again$/, (count, time) => `quelqu’un d’autre interroge cette ligne : ${count} requêtes en ${number(time)}. Cette recherche le gêne, et lui la gêne : mettez fin à ses questions, puis cherchez de nouveau`],
   [/^there is no serial port (.+?)(?:: present: (.+))?$/, (port, there) => `il n’y a pas de port série ${port}${there ? ` ; présents : ${there}` : ''}`],
   [/^the files have changed since they were read, and by them (.+): drived reload first$/, what => `les fichiers ont changé depuis leur lecture, et selon eux ${what} : d’abord drived reload`],
