@@ -869,9 +869,9 @@ def first_hour(page, url, link, port, keys=False):
     hand.press(page.get_by_role("button", name="Scan", exact=True))
     expect(page.locator("progress")).to_be_visible()
     judged(Axe(), page, "a scan")
-    expect(page.locator("main")).to_contain_text("every address was asked. Found: 2")
+    expect(page.locator("main")).to_contain_text("every address was asked. Found: 3")
     finds = page.locator(".finds .find")
-    expect(finds).to_have_count(2)
+    expect(finds).to_have_count(3)
     expect(finds.first).to_contain_text("by its own words")
     # Whom no register tells is told by his nameplate.
     stranger = finds.nth(1)
@@ -885,12 +885,15 @@ def first_hour(page, url, link, port, keys=False):
         stranger.locator("select").select_option("wj200")
     expect(stranger.locator("select")).to_have_value("wj200")
     expect(stranger.locator("input[type=checkbox]")).to_be_checked()
+    # Whose registers look like those of one family is taken for it, and that is said.
+    expect(finds.nth(2)).to_contain_text("a guess by its registers")
+    expect(finds.nth(2).locator("select")).to_have_value("goodrive")
     judged(Axe(), page, "who answers")
-    for at, name in enumerate(["pump", "fan"]):
+    for at, name in enumerate(["pump", "fan", "blower"]):
         hand.write(finds.nth(at).locator("input[type=text]"), name)
     hand.press(page.get_by_role("button", name="Watch these drives"))
     added = page.locator(".added .find")
-    expect(added).to_have_count(2)
+    expect(added).to_have_count(3)
     pump = page.locator(".added .find[data-name=pump]")
     expect(pump).to_have_attribute("data-quality", "good")
     expect(pump).to_contain_text("Read only")
@@ -919,7 +922,7 @@ def first_hour(page, url, link, port, keys=False):
     other.context.close()
     # Whoever comes back finds what was done; no other is asked by it.
     page.goto(url + "#/setup")
-    expect(page.locator(".added .find")).to_have_count(2)
+    expect(page.locator(".added .find")).to_have_count(3)
     # Whoever runs goes on undisturbed by what becomes of others.
     read = "fetch('api/v1/drives/pump').then(answer => answer.json())"
     before = page.evaluate(read)
@@ -935,10 +938,67 @@ def first_hour(page, url, link, port, keys=False):
     assert before["counters"]["lost"] == after["counters"]["lost"], after
     assert after["counters"]["polls"] >= before["counters"]["polls"], after
     until(page, f"{read}.then(drive => drive.counters.polls > {before['counters']['polls']})")
+    guesses(page, hand)
+    changed_by_hand(page, hand)
     # A drive that runs by a command of ours is not let out of reach.
     hand.press(page.locator(".added .find[data-name=pump]").get_by_role("button"))
     hand.press(page.locator("dialog button.primary"))
     expect(page.locator(".said")).to_contain_text("Stop it first")
+
+
+def guesses(page, hand):
+    """What is a guess is told as one in its row, and again where control is taken."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    rows = {name: page.locator(f".added .find[data-name={name}]") for name in ["pump", "fan", "blower"]}
+    expect(rows["blower"]).to_contain_text("taken for goodrive")
+    expect(rows["fan"]).to_contain_text("taken for wj200")
+    expect(rows["pump"]).not_to_contain_text("taken for")
+    hand.press(rows["blower"].get_by_role("button"))
+    expect(page.locator("dialog")).to_contain_text("Compare its nameplate first")
+    judged(Axe(), page, "control of a guess")
+    hand.press(page.get_by_role("button", name="Cancel"))
+    expect(rows["blower"]).to_contain_text("Read only")
+
+
+def changed_by_hand(page, hand):
+    """What a person writes into the file holds when he says so, and whoever is not there any more shows no value of before."""
+    file = page.evaluate("fetch('api/v1/setup').then(answer => answer.json()).then(told => told.file)")
+    reload = "fetch('api/v1/reload', { method: 'POST', headers: { 'Content-Type': 'application/json' } }).then(answer => answer.status)"
+    fan, blower = (page.locator(f".added .find[data-name={name}]") for name in ["fan", "blower"])
+    with open(file, encoding="utf-8") as there:
+        text = there.read()
+
+    def write(entry, change):
+        """The file with another entry of this drive."""
+        entries = text.split("[[drives]]")
+        entries = [change(one) if f'name = "{entry}"' in one else one for one in entries]
+        with open(file, "w", encoding="utf-8") as there:
+            there.write("[[drives]]".join(one for one in entries if one))
+
+    write("fan", lambda one: one.replace("control = false", "control = true"))
+    hand.press(blower.get_by_role("button"))
+    hand.press(page.locator("dialog button.primary"))
+    expect(page.locator(".said")).to_contain_text("fan has other settings")
+    expect(blower).to_contain_text("Read only")
+    expect(fan).to_contain_text("Read only")
+    assert page.evaluate(reload) == 200
+    expect(fan).to_contain_text("Takes commands")
+    # For as long as the page has not heard who is there, a row of whoever has gone stands, and nothing in it.
+    told = page.evaluate("fetch('api/v1/setup').then(answer => answer.text())")
+    page.route("**/api/v1/setup", lambda route: route.fulfill(content_type="application/json", body=told))
+    write("blower", lambda one: "")
+    assert page.evaluate(reload) == 200
+    expect(blower).to_contain_text("not there any more")
+    expect(blower.locator(".number")).to_be_empty()
+    expect(blower.locator(".age")).to_be_empty()
+    assert blower.get_attribute("data-quality") is None and blower.get_attribute("data-state") is None
+    page.unroute("**/api/v1/setup")
+    with open(file, "w", encoding="utf-8") as there:
+        there.write(text)
+    assert page.evaluate(reload) == 200
+    expect(blower).to_have_attribute("data-quality", "good")
+    expect(fan).to_contain_text("Read only")
 
 
 def first_hour_keys(page, url, link, port):

@@ -190,11 +190,11 @@ fn two_hundred_drives_are_listed_and_searched() {
     look(&python, "many", &["run", "--config", config.path()], &[], None);
 }
 
-/// A daemon without a drive beside a line with two, one of a family that is built in and one that a file describes: a browser that is
-/// let in by a link finds them, names them, looks, and takes control of one.
+/// A daemon without a drive beside a line with three, one of a family that is built in and two that files describe, of which one looks
+/// like its family: a browser that is let in by a link finds them, names them, looks, and takes control of one.
 fn begin_at_the_page(scene: &str) {
     let Some(python) = python() else { return };
-    let mut sim = Sim::serve(&format!("page-{scene}"), &["atv312@1", "wj200@3"]);
+    let mut sim = Sim::serve(&format!("page-{scene}"), &["atv312@1", "wj200@3", "goodrive@5"]);
     let (state, socket) = (path(&format!("page-{scene}-state")), path(&format!("page-{scene}.sock")));
     let config =
         File::new(&format!("page-{scene}"), &format!("state = {:?}\n", state.to_str().expect("it is text")));

@@ -23,7 +23,7 @@ use drived_config::{
     config::{DrivePart, add},
     names::Names,
 };
-use drived_file::Config;
+use drived_file::{Config, is_one_wire};
 use drived_http::api::Reload;
 use drived_plant::{
     counts::{Id, Samples, Source},
@@ -48,6 +48,17 @@ struct Inner {
     last: std::sync::Mutex<(bool, u64)>,
     /// What is left of drives that were taken out.
     leavings: std::sync::Mutex<Leavings>,
+    /// Where a scan asks: nobody opens a line there meanwhile.
+    scanned: std::sync::Mutex<Option<Endpoint>>,
+}
+
+/// A port that is a scan's until this is dropped.
+pub(super) struct Claim(Reloader);
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        *self.0.0.scanned.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
 }
 
 impl Reloader {
@@ -71,7 +82,33 @@ impl Reloader {
             config: Mutex::new(config),
             last,
             leavings: std::sync::Mutex::default(),
+            scanned: std::sync::Mutex::default(),
         }))
+    }
+
+    /// No line is opened there until the claim is dropped. Whoever claims looks at the lines that are there behind it: a reload under way
+    /// sees the claim, or is seen. One scan at a time: a second claim would end the first.
+    pub(super) fn claim(&self, endpoint: Endpoint) -> Claim {
+        *self.0.scanned.lock().unwrap_or_else(PoisonError::into_inner) = Some(endpoint);
+        Claim(self.clone())
+    }
+
+    /// Two who ask on one line destroy each other's questions: a line whose port is being scanned is not opened.
+    async fn leaves_the_scan(&self, config: &Config, new: &Config) -> Result<(), Failure> {
+        let scanned = self.0.scanned.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let Some(scanned) = scanned else { return Ok(()) };
+        let changes = changes(config, new);
+        let opened = new.lines.iter().filter(|part| changes.iter().any(|change| change.opens(&part.name)));
+        let opened: Vec<_> =
+            opened.map(|part| (part.name.clone(), part.config.endpoint.clone())).collect();
+        // A name of a server may have to be looked up.
+        let is_there = move || Ok(opened.into_iter().find(|(_, endpoint)| is_one_wire(endpoint, &scanned)));
+        match blocking(is_there).await? {
+            Some((line, _)) => Err(Failure::Input(format!(
+                "the port of line {line:?} is being scanned: wait for it, or give the scan up"
+            ))),
+            None => Ok(()),
+        }
     }
 
     /// Makes a new configuration hold, and `config` what holds then, whatever comes of it.
@@ -181,6 +218,7 @@ impl Reloader {
         });
         let (before, there, new) = read.await?;
         no_new_doubt(&config, &new)?;
+        self.leaves_the_scan(&config, &new).await?;
         // Somebody else's wishes hold when he says so himself.
         let pending = changes(&config, &there);
         let pending = pending.iter().filter(|change| change.is_now());
@@ -283,8 +321,13 @@ impl Reload for Reloader {
         let file = self.0.file.clone();
         // A name of a server may have to be looked up.
         let read = blocking(move || Config::load_workable(&file)).await;
-        let read =
+        let mut read =
             read.and_then(|new| no_new_doubt(&config, &new).and(still_own(&config, &new)).map(|()| new));
+        if let Ok(new) = &read
+            && let Err(scanned) = self.leaves_the_scan(&config, new).await
+        {
+            read = Err(scanned);
+        }
         if dry_run {
             let changes = changes(&config, &read?);
             return Ok(changes.iter().map(|change| change.would_be(&self.0.plant.fleet())).collect());

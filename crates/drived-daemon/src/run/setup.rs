@@ -9,7 +9,7 @@ use drive_bus::Endpoint;
 use drive_families::Family;
 use tokio::{runtime::Handle, sync::oneshot};
 
-use super::reload::Reloader;
+use super::reload::{Claim, Reloader};
 use drived_config::config::look_alikes;
 use drived_file::{
     added::{self, NewDrive},
@@ -46,8 +46,8 @@ struct Inner {
 
 struct Scan {
     view: ScanView,
-    /// Where the line goes.
-    endpoint: Endpoint,
+    /// No line is opened at its port while it is under way.
+    claim: Option<Claim>,
     /// Gives it up.
     given_up: Option<oneshot::Sender<()>>,
 }
@@ -92,8 +92,8 @@ impl Desk {
         let given_up = async { drop(given_up.await) };
         let ended = told::told(wanted, |news| self.heard(news), given_up).await;
         let mut scan = self.scan();
-        let Some(Scan { view, given_up, .. }) = &mut *scan else { return };
-        *given_up = None;
+        let Some(Scan { view, given_up, claim }) = &mut *scan else { return };
+        (*given_up, *claim) = (None, None);
         (view.setting, view.address) = (None, None);
         view.state = match ended {
             Ok(true) => {
@@ -141,7 +141,7 @@ impl Drop for Ending {
         if let Some(scan) = &mut *self.0.scan()
             && scan.is_under_way()
         {
-            scan.given_up = None;
+            (scan.given_up, scan.claim) = (None, None);
             scan.view.state = ScanState::Failed;
             scan.view.why = Some("it has ended without saying why: see the log of the daemon".to_owned());
         }
@@ -191,7 +191,7 @@ impl Setup for Desk {
                     doubts: Vec::new(),
                     why: None,
                 },
-                endpoint: endpoint.clone(),
+                claim: Some(self.0.reloader.claim(endpoint.clone())),
                 given_up: Some(tell),
             })
         };
@@ -226,7 +226,7 @@ impl Setup for Desk {
 
     async fn add(&self, wanted: DrivesWanted) -> Result<Vec<String>, Failure> {
         let spec: LineSpec = wanted.line.trim().parse().map_err(input)?;
-        let endpoint = endpoint(&spec)?;
+        endpoint(&spec)?;
         let line = wanted.name.trim().to_owned();
         if let Some(oddity) = look_alikes::oddity(&line) {
             return Err(Failure::Input(format!("the name of the line {oddity}")));
@@ -235,15 +235,8 @@ impl Setup for Desk {
         if drives.is_empty() {
             return Err(Failure::Input("no drive is chosen".to_owned()));
         }
-        let (desk, port) = (self.clone(), wanted.line.trim().to_owned());
-        // Asked where nothing else can change any more, and on a thread that may wait for a name.
+        let port = wanted.line.trim().to_owned();
         let change = move |text: Option<&str>| {
-            let scanned =
-                desk.scan().as_ref().filter(|scan| scan.is_under_way()).map(|scan| scan.endpoint.clone());
-            if scanned.is_some_and(|scanned| is_one_wire(&scanned, &endpoint)) {
-                let why = "this port is being scanned: wait for it, or give the scan up";
-                return Err(Failure::Input(why.to_owned()));
-            }
             added::with_drives(text, (&line, &port), &drives).map_err(Failure::Input)
         };
         self.0.reloader.change_added(None, change).await

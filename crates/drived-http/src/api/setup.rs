@@ -251,7 +251,10 @@ async fn scan<S: Setup>(
     Sent(wanted): Sent<ScanWanted>,
 ) -> Result<Json<SetupView>, Problem> {
     may(&caller, "scan a port")?;
-    setup.scan(wanted).await.map_err(problem)?;
+    // Nobody who goes away leaves a scan behind that is begun and never ends.
+    let scan = setup.clone();
+    let begun = tokio::spawn(async move { scan.scan(wanted).await }).await;
+    begun.map_err(unfinished)?.map_err(problem)?;
     Ok(Json(setup.view().await))
 }
 
@@ -291,11 +294,12 @@ fn may(caller: &Caller, what: &str) -> Result<(), Problem> {
 fn told(
     done: Result<Result<Vec<String>, Failure>, tokio::task::JoinError>,
 ) -> Result<Json<SetupChanges>, Problem> {
-    match done {
-        Ok(Ok(changes)) => Ok(Json(SetupChanges { changes })),
-        Ok(Err(failure)) => Err(problem(failure)),
-        Err(error) => Err(Problem::new(StatusCode::INTERNAL_SERVER_ERROR, error.to_string())),
-    }
+    let changes = done.map_err(unfinished)?.map_err(problem)?;
+    Ok(Json(SetupChanges { changes }))
+}
+
+fn unfinished(error: tokio::task::JoinError) -> Problem {
+    Problem::new(StatusCode::INTERNAL_SERVER_ERROR, error.to_string())
 }
 
 fn problem(failure: Failure) -> Problem {

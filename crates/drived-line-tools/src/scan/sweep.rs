@@ -27,6 +27,9 @@ const IDENTIFICATION: u8 = 0x2B;
 /// How much longer one is waited for whose answer came too late.
 const SLOWER: u32 = 10;
 
+/// Why a scan has ended before its end.
+const ANOTHER: &str = "somebody else has begun to ask on this line, and the scan has ended: end his asking first, then scan again";
+
 /// So many are, of whom nothing is known but that the next was disturbed: where there is noise that is said of anybody.
 const DISTURBING: usize = 8;
 
@@ -44,6 +47,8 @@ pub(super) struct Sweep<'a, Open> {
     disturbing: Vec<Step>,
     /// Another master was heard before anything was asked.
     pub(super) is_shared: bool,
+    /// It ends where another master begins to ask meanwhile.
+    pub(super) ends_at_another: bool,
     began: Instant,
 }
 
@@ -68,6 +73,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
             silent: None,
             disturbing: Vec::new(),
             is_shared: false,
+            ends_at_another: false,
             began: Instant::now(),
         }
     }
@@ -88,8 +94,20 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
                 found = found.or(Some(step.trial));
                 tell(Told::Found(find))?;
             }
+            self.leaves_to_another()?;
         }
         self.ask_slow(tell).await
+    }
+
+    /// Whoever began to ask behind the beginning has the line, where nobody is there to end his asking.
+    fn leaves_to_another(&self) -> Result<(), Failure> {
+        let Some((_, line)) = self.at.as_ref().filter(|_| self.ends_at_another) else { return Ok(()) };
+        let is_heard =
+            line.findings().into_iter().any(|finding| matches!(finding.defect, Defect::SecondMaster(_)));
+        match is_heard {
+            true => Err(Failure::Input(ANOTHER.to_owned())),
+            false => Ok(()),
+        }
     }
 
     /// Asks those once more, and waits longer, whose answer came when another was asked.

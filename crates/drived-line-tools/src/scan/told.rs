@@ -75,7 +75,8 @@ pub struct Alike {
 /// Scans until every address was asked or `given_up` ends; gives whether every address was asked. Nothing is written.
 ///
 /// # Errors
-/// The port cannot be opened, what is wanted cannot be scanned, or another master is heard: nothing is asked then.
+/// The port cannot be opened, or what is wanted cannot be scanned. Another master is heard: before anything is asked, or behind it, and
+/// nothing more is asked then.
 pub async fn told(
     wanted: Wanted,
     mut tell: impl FnMut(News),
@@ -98,6 +99,7 @@ pub async fn told(
     tell(News::Begins { steps: plan.steps.len(), takes: plan.time() });
     let mut given_up = std::pin::pin!(given_up);
     let mut sweep = Sweep::new(&plan, line.clone(), WAIT, own_line::open_line);
+    sweep.ends_at_another = true;
     tokio::select! {
         // Nobody stands beside it with a hand at the key: into another master's questions nothing is asked.
         heard = listen_first(&line) => if let Some(another) = heard {

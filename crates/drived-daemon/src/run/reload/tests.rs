@@ -138,6 +138,50 @@ async fn the_page_changes_what_it_was_asked_for_and_nothing_that_somebody_else_h
 }
 
 #[tokio::test]
+async fn no_line_is_opened_where_a_scan_asks_by_whatever_door() {
+    use drived_http::api::setup::{ScanState, Setup as _};
+    let folder = drived_config::testing::Folder::new("page-scanned");
+    let (file, added) = (folder.file("drives.toml"), folder.file("added.toml"));
+    fs::write(&file, "state = \".\"\n").unwrap();
+    fs::write(&added, ADDED).unwrap();
+    let (fleet, reloader) = begun(&file);
+    let desk = super::super::setup::Desk::new(reloader.clone());
+    // A gateway behind which nobody answers, so that the scan is under way for as long as nobody gives it up.
+    let gateway = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let line = format!("tcp://{}", gateway.local_addr().unwrap());
+    desk.scan(serde_json::from_value(serde_json::json!({ "line": line })).unwrap()).await.unwrap();
+    // The same server by another name.
+    let theirs = format!(
+        "{ADDED}[lines.b]\nport = \"{}\"\n[[drives]]\nline = \"b\"\ndrive = \"atv312@3\"\nname = \"three\"\n",
+        line.replace("127.0.0.1", "localhost")
+    );
+    fs::write(&added, &theirs).unwrap();
+    let refused = |told: Result<Vec<String>, Failure>| {
+        let Err(Failure::Input(why)) = told else { panic!("{told:?}") };
+        assert!(why.contains("the port of line \"b\" is being scanned"), "{why}");
+    };
+    refused(reloader.reload(false).await);
+    refused(reloader.reload(true).await);
+    fs::write(&added, ADDED).unwrap();
+    let drive = serde_json::json!({ "name": "b", "line": line, "drives": [
+        { "address": 3, "family": "atv312", "name": "three" } ] });
+    refused(desk.add(serde_json::from_value(drive).unwrap()).await);
+    assert_eq!(fs::read_to_string(&added).unwrap(), ADDED, "nothing is written");
+    assert!(fleet.drive("three").is_none());
+    // Other lines come and go meanwhile.
+    let elsewhere = theirs.replace(&line.replace("127.0.0.1", "localhost"), "tcp://192.0.2.2:502");
+    fs::write(&added, elsewhere).unwrap();
+    reloader.reload(false).await.unwrap();
+    desk.cancel();
+    while desk.view().await.scan.is_some_and(|scan| scan.state != ScanState::GivenUp) {
+        tokio::task::yield_now().await;
+    }
+    fs::write(&added, theirs).unwrap();
+    reloader.reload(false).await.unwrap();
+    assert!(fleet.drive("three").is_some());
+}
+
+#[tokio::test]
 async fn a_drive_with_a_stop_that_is_not_confirmed_stays_within_reach_of_the_page() {
     use drived_http::api::setup::Setup as _;
     let folder = drived_config::testing::Folder::new("page-reach");

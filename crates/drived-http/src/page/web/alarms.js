@@ -54,7 +54,7 @@ export function alarms(root) {
     const known = [...plant.alarms.values()];
     for (const chip of filters) {
       const { filter } = chip.dataset;
-      setText(chip, `${t(filter)} ${known.filter(FILTERS[filter]).length}`);
+      setText(chip, `${t(filter === 'all' ? 'alarms_all' : filter)} ${known.filter(FILTERS[filter]).length}`);
       setAttribute(chip, 'aria-pressed', String(filter === (asked.filter || 'all')));
       setClass(chip, 'some', filter === 'alarms_waiting' && known.some(waits));
     }
@@ -140,9 +140,9 @@ function makeItem() {
   }
 }
 
-/** Of whom something follows from an alarm. */
+/** The drives of which something follows from an alarm. */
 function namesOf({ id }) {
-  return [...new Set([...plant.alarms.values()].filter(alarm => alarm.suppressed_by === id).map(ofWhat))];
+  return [...new Set([...plant.alarms.values()].filter(alarm => alarm.drive && alarm.suppressed_by === id).map(ofWhat))];
 }
 
 function done(text, { by }, ms, note) {

@@ -55,7 +55,7 @@ export function at(root, text) {
     const failed = problem => !ended && setText(said, t('past_none', { why: problem.isUnheard ? t('not_reached') : told(problem.message) }));
     read(`history/moment?at_unix_ms=${moment}`).then(then => {
       if (ended) return;
-      drives.replaceChildren(drivesTable(then.drives, drive => why.replaceChildren(whyPanel(drive, moment))));
+      drives.replaceChildren(...drivesTable(then.drives, drive => why.replaceChildren(whyPanel(drive, moment))));
       lines.replaceChildren(then.lines.length ? linesTable(then.lines) : el('p.hint', {}, t('at_no_lines')));
     }, failed);
     read(`history/records?from_unix_ms=${moment - AROUND_MS}&to_unix_ms=${moment + AROUND_MS}&limit=500`).then(({ records }) => {
@@ -68,15 +68,20 @@ export function at(root, text) {
   }
 
   function drivesTable(drives, ask) {
+    const known = drives.filter(({ values }) => Object.keys(values).length > 0);
+    const unknown = drives.filter(one => !known.includes(one)).map(({ drive }) => drive).sort(byName);
+    // Why may be known also where no value is.
+    const rest = unknown.length ? el('div', {}, el('p.hint', {}, t('at_unknown')), el('p.chips', {}, ...unknown.map(drive =>
+      el('button', { type: 'button', 'aria-label': t('at_why_of', { drive }), onclick: () => ask(drive) }, drive)))) : '';
+    if (!known.length) return [rest];
     const heads = [t('drive'), t('state'), ...SHOWN.map(name => [valueOf(name).text, 'right']), t('control'), t('at_what')];
-    return table('', heads, [...drives].sort((one, other) => byName(one.drive, other.drive)).map(({ drive, values, exact }) => {
-      const isKnown = Object.keys(values).length > 0;
+    return [table('', heads, known.sort((one, other) => byName(one.drive, other.drive)).map(({ drive, values, exact }) => {
       const numbers = SHOWN.map(name => el('td.right', {}, quantity(values[name], valueOf(name).digits, valueOf(name).unit)));
-      const state = isKnown ? [word(values.state), values.motion && word(values.motion)].filter(Boolean).join(', ') : t('at_unknown');
+      const state = [word(values.state), values.motion && word(values.motion)].filter(Boolean).join(', ');
       return el(values.state === 'fault' ? 'tr.in-trouble' : 'tr', {}, el('th', { scope: 'row' }, el('a', { href: ofPast([drive]) }, drive)),
-        el('td', {}, state, isKnown && !exact ? el('small', {}, ` ${t('at_mean')}`) : null), ...numbers, el('td', {}, word(values.control)),
+        el('td', {}, state, !exact ? el('small', {}, ` ${t('at_mean')}`) : null), ...numbers, el('td', {}, word(values.control)),
         el('td', {}, el('button', { type: 'button', 'aria-label': t('at_why_of', { drive }), onclick: () => ask(drive) }, t('at_why'))));
-    }));
+    })), rest];
   }
 
   function linesTable(lines) {

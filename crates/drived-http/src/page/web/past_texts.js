@@ -40,7 +40,7 @@ export const PAST_TEXTS = {
   at_never: ['This time did not exist: the clock was put forward over it.', 'Cette heure n’a pas existé : l’horloge a été avancée.'],
   at_twice: ['This time came twice, because the clock was put back. Which one?', 'Cette heure est venue deux fois, l’horloge ayant été retardée. Laquelle ?'],
   at_drives: ['How the drives were', 'Comment étaient les variateurs'],
-  at_unknown: ['nothing is known', 'rien n’est connu'],
+  at_unknown: ['No value is known of these. Why?', 'Aucune valeur n’est connue de ceux-ci. Pourquoi ?'],
   at_mean: ['means of its minute or hour: nothing finer is kept', 'moyennes de sa minute ou heure : rien de plus fin n’est conservé'],
   at_why: ['Why?', 'Pourquoi ?'],
   at_why_of: ['Why: {drive} at this moment', 'Pourquoi : {drive} à ce moment'],

@@ -4,7 +4,7 @@ export const SETUP_TEXTS = {
   enter: ['This browser is made known', 'Ce navigateur se fait connaître'],
   enter_now: ['One moment…', 'Un instant…'],
   enter_again: ['Try again', 'Réessayer'],
-  enter_none: ['There is no code in this address.', 'Cette adresse ne contient pas de code.'],
+  enter_none: ['There is no code in this address: it is taken out of it as soon as it is read. Open the link itself once more; it is good for ten minutes. Another is made on the host by: drived token link NAME --role engineer', 'Cette adresse ne contient pas de code : il en est retiré dès qu’il est lu. Ouvrez encore une fois le lien lui-même ; il vaut dix minutes. Sur l’hôte, drived token link NOM --role engineer en fait un autre.'],
   enter_wrong: ['This link is not good any more: each is good once, and for ten minutes. Another is made on the host by: drived token link NAME --role engineer', 'Ce lien n’est plus valable : chacun ne l’est qu’une fois, pendant dix minutes. Sur l’hôte, drived token link NOM --role engineer en fait un autre.'],
   setup_view: ['Find and add drives', 'Trouver et ajouter des variateurs'],
   setup_about: ['Nothing is written to a drive here: they are asked who they are, and watched. Commands are taken only for a drive of which you say so.', 'Rien n’est écrit dans un variateur ici : on leur demande qui ils sont et on les observe. Un ordre n’est accepté que pour un variateur dont vous le dites.'],

@@ -41,7 +41,7 @@ export function eventText(happened) {
   const { event, text = '' } = happened;
   if (event === 'line_finding' && language() === 'fr') return findingText(happened);
   const kind = String(event).replaceAll('_', ' ');
-  const rest = text.startsWith(kind) ? text.slice(kind.length).replace(/^[:,] /, '') : text;
+  const rest = text.startsWith(kind) ? text.slice(kind.length).replace(/^[:,]? /, '') : text;
   const change = rest.match(/^(\w+) to (\w+)$/);
   if (change) return `${word(change[1])} → ${word(change[2])}`;
   const given = rest.match(/^(.+) by (.+?): (confirmed|not confirmed|outcome unknown|refused|expired)(?:: (.+))?$/);

@@ -98,6 +98,34 @@ async fn a_second_master_is_no_second_drive() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_master_that_begins_to_ask_behind_the_beginning_ends_a_scan_that_nobody_stands_beside() {
+    let (simulated, _) = one();
+    let requests = vec![(5, vec![3, 0x0C, 0x81, 0, 1])];
+    let second_master = Some(SecondMaster { requests, every: 250 * MS });
+    simulated.set_defects(Defects { second_master, ..Defects::default() });
+    let plan = at_one("19200 8N1", 1..=247);
+    let open = async |config: LineConfig| Ok(Line::over(simulated.in_memory_at(config.serial), config));
+    for is_alone in [true, false] {
+        let mut sweep = Sweep::new(&plan, LineConfig::stream(SerialSettings::MODBUS_DEFAULT), WAIT, open);
+        sweep.ends_at_another = is_alone;
+        let mut asked = 0;
+        let told = |told| {
+            asked += usize::from(matches!(told, Told::At { .. }));
+            Ok(())
+        };
+        let ended = sweep.run(|_, _| true, told).await;
+        sweep.close().await;
+        match (is_alone, ended) {
+            (true, Err(Failure::Input(why))) => {
+                assert!(why.contains("has begun to ask on this line") && asked < 40, "{asked}: {why}");
+            }
+            (false, Ok(())) => assert_eq!(asked, 247),
+            (_, ended) => panic!("{is_alone}: {ended:?}"),
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_slow_neighbour_is_no_second_drive() {
     for millis in [101, 105, 108, 111, 115, 120, 130, 150, 180, 300] {
         let (simulated, drive) = one();
