@@ -173,7 +173,8 @@ async fn watched() -> Rig {
         family.machine(SetUp::ForTheBus).expect("it has a twin")
     })
     .rig();
-    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    let given = rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await;
+    assert!(given.is_err_and(|error| error.only_a_start_shows()));
     rig.drive.start(Direction::Forward).await.expect("it starts");
     rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == 3_000).await;
     sleep(Duration::from_millis(1)).await;
@@ -264,7 +265,12 @@ async fn a_word_for_another_register_is_not_taken_for_the_command_that_stands() 
 async fn a_start_of_a_drive_whose_reference_is_elsewhere_is_refused() {
     let local = SPLIT.replace("mask = 0x0100, value = 0x0100", "mask = 0x0100, value = 0x0000");
     let mut rig = rig_of(SPLIT, &local);
-    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    let unseen = rig
+        .drive
+        .set_setpoint(Frequency::from_hertz(30).into())
+        .await
+        .expect_err("it reads back, and no more");
+    assert!(matches!(unseen, Error::NotConfirmed { .. }) && !unseen.only_a_start_shows(), "{unseen}");
     let began = Instant::now();
     let refused = rig.drive.start(Direction::Forward).await.expect_err("its reference is elsewhere");
     assert_eq!(
