@@ -300,7 +300,11 @@ fn nothing_that_is_shipped_rests_on_a_bit_of_which_sources_contradict_each_other
         let told = [&file.see.at_setpoint, &file.see.warning, &file.state.standstill];
         let owners = [&file.ownership.command, &file.ownership.reference];
         let all = (file.state.is.iter().map(|is| is.get_ref().bits.get_ref()))
-            .chain(told.into_iter().filter_map(|answer| answer.given()).map(|bits| bits.get_ref()))
+            .chain(
+                told.into_iter()
+                    .filter_map(|answer| answer.given())
+                    .map(drive_profile::format::Spanned::get_ref),
+            )
             .chain(owners.into_iter().filter_map(|answer| answer.given()).map(|owner| &owner.get_ref().bits));
         for bits in all.filter(|bits| bits.register.get_ref() == register) {
             assert_eq!(bits.mask.get_ref() & mask, 0, "{key} {register}: {why}");

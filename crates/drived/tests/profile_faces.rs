@@ -38,7 +38,7 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
     });
     let text = format!(
         "state = \"{}\"\n{mqtt}[http]\nlisten = \"127.0.0.1:{http}\"\n[[gateways]]\nlisten = \"127.0.0.1:{gateway}\"\n\
-         [lines.bench]\nport = \"{},19200,8N1\"\n[[drives]]\nline = \"bench\"\ndrive = \"wj200@3\"\nname = \"pump\"\ncontrol = true\n\
+         [groups]\npumps = [\"pump\"]\n[lines.bench]\nport = \"{},19200,8N1\"\n[[drives]]\nline = \"bench\"\ndrive = \"wj200@3\"\nname = \"pump\"\ncontrol = true\n\
          options = {{ highest = \"50Hz\", commands-alone = \"yes\" }}\n",
         state.display(),
         sim.link()
@@ -116,6 +116,10 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
     // What cannot be read is an exception, and no zero.
     assert_eq!(asked(gateway, 3, 0x2000), [0x83]);
     run(&["stop", "pump", "--socket", socket]).assert_done();
+    // All setpoints of a group come before its starts, and of this drive only a start shows one.
+    let started = run(&["start", "pumps", "--setpoint", "25Hz", "--socket", socket]);
+    assert_eq!(started.code, Some(0), "{started:?}");
+    run(&["stop", "pumps", "--socket", socket]).assert_done();
     let (code, last) = daemon.interrupt();
     assert_eq!(code, Some(0), "{last}");
     // The tools on the line, when nobody else holds it.
