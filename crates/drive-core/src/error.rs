@@ -387,6 +387,12 @@ impl Error {
         }
     }
 
+    /// Whether it says of a setpoint that nothing speaks against it, and that only a start shows it: a start may follow.
+    #[must_use]
+    pub const fn only_a_start_shows(&self) -> bool {
+        matches!(self, Self::NotConfirmed { because: Some(Refusal::OnlyAStartShows(_)), .. })
+    }
+
     /// Whether a family, or a drive, has nothing to say of what it is: an answer, and none of the identity.
     #[must_use]
     pub fn is_speechless(&self) -> bool {

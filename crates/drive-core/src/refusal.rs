@@ -61,6 +61,9 @@ pub enum Refusal {
     /// The drive has said that it is another one than its family's, in these words: it is read, and stopped when that is asked
     /// for, and nothing else is written.
     AnotherDrive(&'static str),
+    /// Of a setpoint: nothing speaks against it, and nothing shows that the drive goes by it before the motor runs; the text says what
+    /// there is to see. A start may follow it, and shows it.
+    OnlyAStartShows(&'static str),
 }
 
 impl Refusal {
@@ -79,6 +82,7 @@ impl Refusal {
             Self::EepromLife => "eeprom_life",
             Self::MotorRunning => "motor_running",
             Self::AnotherDrive(_) => "another_drive",
+            Self::OnlyAStartShows(_) => "only_a_start_shows",
         }
     }
 }
@@ -122,7 +126,7 @@ impl fmt::Display for Refusal {
             Self::DirectionForbidden => {
                 f.write_str("the drive's settings forbid this direction: allow it there, or start the other way")
             }
-            Self::Settings(which) => f.write_str(which),
+            Self::Settings(which) | Self::OnlyAStartShows(which) => f.write_str(which),
             Self::Overridden { by, remedy } => write!(f, "{by} decides instead: {remedy}"),
             Self::RestartsItself(restart) => {
                 let code = restart.code;

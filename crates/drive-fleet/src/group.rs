@@ -356,7 +356,7 @@ impl Group {
                 let ticket = member.order_on(Some(leave), None, order);
                 let outcome = ticket.unheard(false).await;
                 told.hold(ticket);
-                failed.fetch_or(!outcome.is_confirmed(), Ordering::Relaxed);
+                failed.fetch_or(!outcome.lets_a_start_follow(), Ordering::Relaxed);
                 Some((Arc::clone(member.name()), outcome))
             };
             self.on_line(member, command).await
@@ -380,7 +380,7 @@ impl Group {
 
     async fn keep_or_stop(&self, outcomes: Vec<(Arc<str>, Outcome)>) -> GroupStarted {
         let (confirmed, outcomes): (Vec<_>, Vec<_>) =
-            outcomes.into_iter().partition(|(_, outcome)| outcome.is_confirmed());
+            outcomes.into_iter().partition(|(_, outcome)| outcome.lets_a_start_follow());
         if outcomes.is_empty() {
             return Ok(confirmed);
         }

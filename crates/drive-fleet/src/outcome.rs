@@ -135,6 +135,14 @@ impl Outcome {
         matches!(self, Self::Confirmed | Self::Started(_) | Self::Stopped(_))
     }
 
+    /// Whether a start may follow: it is confirmed, or a setpoint that only a start shows.
+    pub(crate) const fn lets_a_start_follow(&self) -> bool {
+        match self {
+            Self::NotConfirmed(Unconfirmed::Denied(error)) => error.only_a_start_shows(),
+            _ => self.is_confirmed(),
+        }
+    }
+
     /// Of a start that is in force: which way, and the setpoint that it uses.
     #[must_use]
     pub const fn started(&self) -> Option<Started> {

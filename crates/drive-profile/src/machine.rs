@@ -13,7 +13,7 @@ use drive_sim::{
 use self::bits::Places;
 use crate::{
     drive::Words,
-    format::{Access, Bits, Guard, Order, Register, Space, UnitName},
+    format::{Access, Acts, Bits, Guard, Order, Register, Space, UnitName},
     profile::{Profile, Written},
     scale::{counts, hundredths},
 };
@@ -174,6 +174,20 @@ impl Machine {
             (self.order, self.ramp) = (None, RAMP);
         } else if writes(&file.reset).contains(&written) {
             (self.order, self.fault) = (None, None);
+        } else if self.order.is_some()
+            && file.command.given().is_some_and(|of| of.get_ref().acts == Acts::Level)
+        {
+            // A direction of its own acts at once on a motor that runs by a level.
+            let stands = |start| {
+                let all = writes(start);
+                let is_its = all.iter().any(|of| (of.space, of.address) == (written.space, written.address));
+                is_its && all.iter().all(|of| self.stands(&all, *of))
+            };
+            if stands(&file.start.forward) {
+                self.order = Some(Direction::Forward);
+            } else if stands(&file.start.reverse) {
+                self.order = Some(Direction::Reverse);
+            }
         }
         // A run command that comes to a drive that has tripped or has no supply is lost.
         if self.fault.is_some() || !self.supplied || self.local {
@@ -185,7 +199,8 @@ impl Machine {
     fn stands(&self, action: &[Written], of: Written) -> bool {
         let place = (of.space, of.address);
         let left = action.iter().rev().find(|other| (other.space, other.address) == place);
-        left.is_none_or(|left| self.kept.get(&place) == Some(&left.value))
+        // What nobody has written is 0.
+        left.is_none_or(|left| self.kept.get(&place).copied().unwrap_or(0) == left.value)
     }
 
     /// The state that it shows.
@@ -273,17 +288,23 @@ impl Machine {
         let state = self.state();
         let is_it = |words: &Cells| self.told(words) == state;
         let mut best = words.clone();
+        // Each register that tells it: those who read another than the profile does are told the same.
+        let mut telling: Vec<&str> = Vec::new();
         for row in
             file.state.is.iter().map(crate::format::Spanned::get_ref).filter(|is| is.state.state() == state)
         {
-            let mut tried = words.clone();
-            self.set(&mut tried, row.bits.get_ref(), true);
+            let bits = row.bits.get_ref();
+            if telling.contains(&bits.register.get_ref().as_str()) {
+                continue;
+            }
+            let mut tried = best.clone();
+            self.set(&mut tried, bits, true);
             if state == State::Running || output != 0 {
                 self.show_direction(&mut tried, output);
             }
             if is_it(&tried) {
                 best = tried;
-                break;
+                telling.push(bits.register.get_ref());
             }
         }
         let starts = [&file.start.forward, &file.start.reverse].into_iter().filter_map(|start| start.given());

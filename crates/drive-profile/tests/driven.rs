@@ -13,8 +13,11 @@ use drive_testing::{
     worlds::{Configuration, Event, Share, Surrounded},
 };
 
-/// Those that reach motion and show the setpoint that they hold: of the VF-S15 a setpoint is not confirmed before it is started.
-const DRIVEN: [&str; 8] = ["danfoss-fc", "goodrive", "ig5a", "v20", "g120", "altivar", "wj200", "mx2"];
+/// Those that reach motion.
+const DRIVEN: [&str; 9] =
+    ["danfoss-fc", "goodrive", "ig5a", "v20", "g120", "altivar", "wj200", "mx2", "vfs15"];
+/// Those of them that show the setpoint in force in another register than that which takes it.
+const SHOWN: [&str; 2] = ["goodrive", "altivar"];
 
 fn family(key: &str) -> Family {
     family_of(shipped::find(key).expect("it is shipped").clone())
@@ -38,13 +41,16 @@ fn rig(key: &str) -> Rig {
     contract(family, family.simulated_options()).rig()
 }
 
+/// Gives a setpoint: in force, or taken by a drive of which only a start shows whether it is.
+async fn give(rig: &mut Rig, hertz: u16) {
+    let given = rig.drive.set_setpoint(Frequency::from_hertz(hertz).into()).await;
+    assert!(given.as_ref().err().is_none_or(Error::only_a_start_shows), "{given:?}");
+}
+
 async fn running(key: &str) -> Rig {
     let mut rig = rig(key);
     rig.drive.status().await.expect("it answers");
-    rig.drive
-        .set_setpoint(Frequency::from_hertz(30).into())
-        .await
-        .unwrap_or_else(|error| panic!("{key}: {error}"));
+    give(&mut rig, 30).await;
     rig.drive.start(Direction::Forward).await.unwrap_or_else(|error| panic!("{key}: {error}"));
     rig.until_machine("the output is that of the setpoint", |machine| machine.output_frequency == 3_000)
         .await;
@@ -54,6 +60,44 @@ async fn running(key: &str) -> Rig {
 /// Whether a request only reads: functions 1 to 4.
 fn is_read(request: &drive_sim::Received) -> bool {
     matches!(request.pdu.first(), Some(1..=4))
+}
+
+/// A register that reads back as it was written is an echo: the five families, too, confirm a setpoint at standstill by what the drive tells of its
+/// active reference.
+#[tokio::test(start_paused = true)]
+async fn at_rest_a_setpoint_is_confirmed_by_what_shows_it_in_force_and_by_no_echo() {
+    for key in DRIVEN {
+        let mut rig = rig(key);
+        rig.drive.status().await.expect("it answers");
+        let given = rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await;
+        if SHOWN.contains(&key) {
+            given.unwrap_or_else(|error| panic!("{key}: {error}"));
+        } else {
+            let error = given.expect_err(key);
+            assert!(
+                error.only_a_start_shows() && error.to_string().contains("see its output"),
+                "{key}: {error}"
+            );
+        }
+        assert!(!rig.machine.observe().running, "{key}: a setpoint is no start");
+        rig.drive.start(Direction::Forward).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        rig.until_machine("it is what was given", |machine| machine.output_frequency.abs_diff(3_000) < 2)
+            .await;
+        // Of a motor that runs its output is seen to follow.
+        rig.drive
+            .set_setpoint(Frequency::from_hertz(20).into())
+            .await
+            .unwrap_or_else(|error| panic!("{key}: {error}"));
+    }
+    // Its register is the one that takes it, and the drive tells that its reference is the bus's.
+    let family =
+        family_of(read(include_str!("data/split.toml")).unwrap_or_else(|refusals| panic!("{refusals}")));
+    let mut rig = contract(family, family.simulated_options()).rig();
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("its reference is the bus's");
+    rig.machine.panel(drive_sim::Panel::TakeControl);
+    let error =
+        rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect_err("it is the panel's");
+    assert!(!error.only_a_start_shows(), "{error}");
 }
 
 /// What [`Contract`] asks of every family but for one thing: a drive that does not tell who commands it is told in force by no status.
@@ -134,7 +178,7 @@ async fn a_drive_of_split_registers_is_turned_round_and_its_run_command_is_in_fo
     contract.lives_the_story().await;
     let mut rig = contract.rig();
     rig.drive.status().await.expect("it answers");
-    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    give(&mut rig, 30).await;
     for (direction, output) in [(Direction::Forward, 3_000), (Direction::Reverse, -3_000)] {
         rig.drive.start(direction).await.expect("it starts");
         rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == output).await;
@@ -152,14 +196,14 @@ async fn a_drive_of_split_registers_is_turned_round_and_its_run_command_is_in_fo
 async fn a_start_at_another_setpoint_than_was_given_is_not_confirmed() {
     let mut rig = rig("goodrive");
     rig.drive.status().await.expect("it answers");
-    rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+    give(&mut rig, 20).await;
     rig.machine.written_by_another(0x2001, 3_000).expect("it takes it");
     let error = rig.drive.start(Direction::Forward).await.expect_err("it runs at 30 Hz");
     assert!(
         matches!(error, Error::NotConfirmed { .. }) && error.to_string().contains("another setpoint"),
         "{error}"
     );
-    rig.drive.set_setpoint(Frequency::from_hertz(25).into()).await.expect("it takes it");
+    give(&mut rig, 25).await;
     rig.drive.stop(StopMode::Ramp).await.expect("it stops");
     rig.until_machine("it stands", |machine| machine.shaft_frequency == 0).await;
     rig.drive.start(Direction::Forward).await.expect("it is what was given");
@@ -248,7 +292,7 @@ async fn neither_a_lost_line_nor_a_power_cycle_makes_it_write_anything() {
 #[tokio::test(start_paused = true)]
 async fn a_motor_that_another_has_started_is_not_turned_round() {
     let mut rig = rig("danfoss-fc");
-    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    give(&mut rig, 30).await;
     rig.machine.written_by_another(49_999, 0x047C).expect("it takes it");
     rig.until("it runs", |status| status.state == State::Running).await;
     let refused = rig.drive.start(Direction::Reverse).await.expect_err("it is not ours");
@@ -335,7 +379,8 @@ async fn a_setpoint_beyond_what_is_known_is_refused_and_not_sent() {
         assert!(rig.machine.received().iter().all(|request| request.pdu.first() == Some(&3)), "{key}");
     }
     let mut rig = rig("v20");
-    rig.drive.set_setpoint(Percent::from_percent(50).into()).await.expect("it counts so");
+    let given = rig.drive.set_setpoint(Percent::from_percent(50).into()).await;
+    assert!(given.is_err_and(|error| error.only_a_start_shows()), "it counts so");
     assert_eq!(rig.machine.peek(100), Some(8_192), "HSW 40101");
 }
 
@@ -399,7 +444,7 @@ async fn the_three_that_motion_was_proved_for_say_the_truth_in_every_world_aroun
 async fn a_stop_that_is_refused_ends_no_lease_whatever_state_the_drive_shows() {
     for trips in [false, true] {
         let mut rig = misread("invt/goodrive", "goodrive", "address = 0x2000", "address = 0x2010");
-        rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+        give(&mut rig, 20).await;
         rig.drive.start(Direction::Forward).await.expect_err("it is refused");
         if trips {
             rig.machine.trip(9);
@@ -441,7 +486,7 @@ async fn the_lease_of_a_start_of_several_words_is_of_the_word_that_runs() {
     let family = family_of(read(&text).unwrap_or_else(|refusals| panic!("{refusals}")));
     let mut rig = contract(family, family.simulated_options()).rig();
     rig.drive.status().await.expect("it answers");
-    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    give(&mut rig, 30).await;
     for direction in [Direction::Forward, Direction::Reverse] {
         rig.drive.start(direction).await.unwrap_or_else(|error| panic!("{direction}: {error}"));
         assert_eq!(rig.drive.lease().map(|lease| lease.word), Some(1), "{direction}");
@@ -466,7 +511,7 @@ fn misread(name: &str, key: &str, place: &str, by: &str) -> Rig {
 async fn a_motor_that_turns_the_other_way_than_it_was_told_is_not_confirmed() {
     let mut rig =
         misread("invt/goodrive", "goodrive", "forward = 1, reverse = 2", "forward = 2, reverse = 1");
-    rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+    give(&mut rig, 20).await;
     let error = rig.drive.start(Direction::Forward).await.expect_err("it turns in reverse");
     assert!(matches!(error, Error::NotConfirmed { .. }), "{error}");
     assert!(rig.drive.lease().is_some(), "it may run by us all the same");
@@ -476,7 +521,7 @@ async fn a_motor_that_turns_the_other_way_than_it_was_told_is_not_confirmed() {
 #[tokio::test(start_paused = true)]
 async fn an_exception_to_a_run_command_is_no_proof_that_nothing_was_done() {
     let mut rig = misread("invt/goodrive", "goodrive", "address = 0x2000", "address = 0x2010");
-    rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+    give(&mut rig, 20).await;
     let error = rig.drive.start(Direction::Forward).await.expect_err("it is refused");
     assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
     assert!(rig.drive.lease().is_some());
@@ -504,7 +549,7 @@ async fn a_stop_and_a_withdrawal_go_to_a_drive_that_was_run_from_here_whatever_i
         if adopts {
             rig.drive.adopt(drive_core::Lease::new(Direction::Forward, 1));
         } else {
-            rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+            give(&mut rig, 20).await;
             rig.drive.start(Direction::Forward).await.expect("it starts");
         }
         rig.machine.trip(9);
@@ -542,7 +587,7 @@ async fn a_stop_of_a_drive_that_is_set_up_otherwise_by_now_is_the_one_that_is_a_
         .replace("unread = \"ramp\"", "unread = \"freewheel\"");
     let family = family_of(read(&text).expect("it is right"));
     let mut rig = contract(family, family.simulated_options()).rig();
-    rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect("it takes it");
+    give(&mut rig, 20).await;
     rig.drive.start(Direction::Forward).await.expect("it starts");
     rig.machine.trip(9);
     rig.drive.forget();
@@ -580,7 +625,7 @@ async fn a_shaft_is_told_at_rest_by_what_its_file_names_for_that() {
         let family = family_of(read(&text).unwrap_or_else(|refusals| panic!("{refusals}")));
         let mut rig = contract(family, family.simulated_options()).rig();
         assert_eq!(rig.drive.status().await.expect("it answers").motion, end, "it was never seen to turn");
-        rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+        give(&mut rig, 30).await;
         rig.drive.start(Direction::Forward).await.expect("it starts");
         rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == 3_000).await;
         rig.drive.stop(StopMode::Freewheel).await.expect("it stops");
@@ -594,7 +639,7 @@ async fn a_shaft_is_told_at_rest_by_what_its_file_names_for_that() {
 #[tokio::test(start_paused = true)]
 async fn a_start_is_not_confirmed_by_a_motor_that_still_comes_down_from_a_stop_of_this_side() {
     let mut rig = misread("danfoss/danfoss-fc", "danfoss-fc", "words = [0x847C]", "words = [0x8C7C]");
-    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    give(&mut rig, 30).await;
     rig.drive.start(Direction::Forward).await.expect("it starts");
     rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == 3_000).await;
     rig.drive.stop(StopMode::Ramp).await.expect("it is seen to come down");
@@ -658,7 +703,10 @@ async fn a_setpoint_that_only_reads_back_is_not_confirmed_while_the_motor_runs_o
     let twin = move || machine.machine(SetUp::ForTheBus).expect("it has a twin");
     let mut rig = Contract::new(of.capabilities(), open, twin).rig();
     rig.machine.written_by_another(102, 9_830).expect("30 Hz");
-    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    let error =
+        rig.drive.set_setpoint(Frequency::from_hertz(10).into()).await.expect_err("at rest nothing shows it");
+    assert!(error.only_a_start_shows(), "{error}");
+    give(&mut rig, 30).await;
     rig.drive.start(Direction::Forward).await.expect("it starts");
     rig.until_machine("it is at 30 Hz", |machine| machine.output_frequency > 2_990).await;
     let error = rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect_err("it runs at 30 Hz");
@@ -667,10 +715,7 @@ async fn a_setpoint_that_only_reads_back_is_not_confirmed_while_the_motor_runs_o
     // Where it follows, it is seen to.
     for key in DRIVEN {
         let mut rig = running(key).await;
-        rig.drive
-            .set_setpoint(Frequency::from_hertz(20).into())
-            .await
-            .unwrap_or_else(|error| panic!("{key}: {error}"));
+        give(&mut rig, 20).await;
         rig.until_machine("it follows", |machine| machine.output_frequency.abs_diff(2_000) < 10).await;
     }
 }

@@ -61,6 +61,82 @@ async fn written_while(rig: &mut Rig, register: u16, time: Duration) -> Vec<u16>
     words
 }
 
+/// Each pattern of control, with a profile that has it, and how its drives are turned round where it does not say.
+const PATTERNS: [(&str, &str, Turned); 9] = [
+    ("a code", "goodrive", Turned::Round),
+    ("bits", "danfoss-fc", Turned::Round),
+    ("bits", "vfs15", Turned::Round),
+    ("CiA 402", "atv312", Turned::Round),
+    ("CiA 402", "altivar", Turned::NotKnown),
+    ("PROFIdrive", "v20", Turned::Round),
+    ("coils", "wj200", Turned::Round),
+    ("split registers", "split", Turned::Round),
+    ("setpoint is the command", "signed", Turned::Round),
+];
+
+#[derive(Debug, PartialEq)]
+enum Turned {
+    Round,
+    /// Its profile does not say how: it is `Unsupported`.
+    NotKnown,
+}
+
+/// Started, turned round, stopped, tripped, reset and lost, each status held against the shaft of its twin. On slaves of another hand
+/// `tests/profile_strangers.rs` of the workspace does the same.
+#[tokio::test(start_paused = true)]
+async fn each_pattern_of_control_is_lived_through_each_act() {
+    for (pattern, key, turned) in PATTERNS {
+        let profile = match key {
+            "atv312" => profile(include_str!("../../../tests/profiles/atv312.toml")),
+            "split" => profile(SPLIT),
+            "signed" => profile(SIGNED),
+            key => shipped::find(key).expect("it is shipped").clone(),
+        };
+        assert_eq!(profile.level(), Level::Motion, "{key}");
+        let mut rig = rig(profile);
+        rig.drive.status().await.expect("it answers");
+        let given = rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await;
+        assert!(given.as_ref().err().is_none_or(Error::only_a_start_shows), "{key}: {given:?}");
+        let run = async |rig: &mut Rig, direction, output: i32| {
+            rig.drive.start(direction).await.unwrap_or_else(|error| panic!("{key} {direction}: {error}"));
+            rig.until_machine("its setpoint", |seen| seen.output_frequency.abs_diff(output) < 2).await;
+        };
+        run(&mut rig, Direction::Forward, 3_000).await;
+        if turned == Turned::Round {
+            run(&mut rig, Direction::Reverse, -3_000).await;
+        } else {
+            let refused = rig.drive.start(Direction::Reverse).await.expect_err("nobody knows how");
+            assert_eq!(refused.kind(), ErrorKind::Unsupported, "{key}: {refused}");
+        }
+        let stopped = rig.drive.stop(StopMode::Ramp).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        assert_eq!((stopped.mode, rig.drive.lease()), (StopMode::Ramp, None), "{key}");
+        rig.until_machine("it stands", |seen| !seen.running && seen.shaft_frequency == 0).await;
+        run(&mut rig, Direction::Forward, 3_000).await;
+        rig.machine.trip(9);
+        rig.until("the trip", |status| status.state == State::Fault).await;
+        rig.drive.start(Direction::Forward).await.expect_err("it has tripped");
+        rig.until_machine("it stands", |seen| seen.shaft_frequency == 0).await;
+        rig.drive.reset_faults().await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        rig.poll_for(Duration::from_secs(3)).await;
+        assert!(!rig.machine.observe().running, "{key}: a reset is no start");
+        run(&mut rig, Direction::Forward, 3_000).await;
+        rig.machine.mute();
+        let lost = rig.drive.status().await.expect_err("nobody answers");
+        assert_eq!(lost.kind(), ErrorKind::NoAnswer, "{key}");
+        rig.machine.unmute();
+        rig.drive.forget();
+        sleep(Duration::from_secs(12)).await;
+        rig.poll_for(Duration::from_secs(2)).await;
+        assert!(
+            rig.drive.lease().is_some() && rig.machine.observe().running,
+            "{key}: it runs on by what stands"
+        );
+        rig.drive.stop(StopMode::Ramp).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        rig.until_machine("it stands", |seen| !seen.running && seen.shaft_frequency == 0).await;
+        println!("{pattern} ({key}): started, reversed ({turned:?}), stopped, tripped, reset, lost");
+    }
+}
+
 /// Started, turned round, stopped, tripped, reset and lost. Its setpoint goes out with a start, and to a motor that runs by it; never else.
 #[tokio::test(start_paused = true)]
 async fn a_setpoint_that_is_the_run_command_is_kept_until_a_start() {
@@ -173,7 +249,8 @@ async fn watched() -> Rig {
         family.machine(SetUp::ForTheBus).expect("it has a twin")
     })
     .rig();
-    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    let given = rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await;
+    assert!(given.is_err_and(|error| error.only_a_start_shows()));
     rig.drive.start(Direction::Forward).await.expect("it starts");
     rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == 3_000).await;
     sleep(Duration::from_millis(1)).await;
@@ -264,7 +341,12 @@ async fn a_word_for_another_register_is_not_taken_for_the_command_that_stands() 
 async fn a_start_of_a_drive_whose_reference_is_elsewhere_is_refused() {
     let local = SPLIT.replace("mask = 0x0100, value = 0x0100", "mask = 0x0100, value = 0x0000");
     let mut rig = rig_of(SPLIT, &local);
-    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    let unseen = rig
+        .drive
+        .set_setpoint(Frequency::from_hertz(30).into())
+        .await
+        .expect_err("it reads back, and no more");
+    assert!(matches!(unseen, Error::NotConfirmed { .. }) && !unseen.only_a_start_shows(), "{unseen}");
     let began = Instant::now();
     let refused = rig.drive.start(Direction::Forward).await.expect_err("its reference is elsewhere");
     assert_eq!(

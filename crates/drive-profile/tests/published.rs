@@ -70,6 +70,48 @@ const MISTAKES: &[Mistake] = &[
         Refused("holds a run bit"),
     ),
     (
+        "Buildbotics: the tables of MX2, WJ200, Teco, EM60 and Fuling have no row that stops",
+        WJ200,
+        &[(
+            "ramp = { steps = [{ write = \"RUN\", coils = [false] }], seen = [\"ready\", \"stopping\", \"not_ready\", \"fault\"], source = \"manual linuxcnc\" }",
+            "ramp = \"unknown\"",
+        )],
+        Refused("the reset is left standing"),
+    ),
+    (
+        "Buildbotics: a highest frequency of 0, by which it divides",
+        V20,
+        &[("limits = { low = 0, high = 16384 }", "limits = { low = 0, high = 0 }")],
+        Refused("without limits"),
+    ),
+    (
+        "ESPHome: the last state is written again at boot",
+        V20,
+        &[("acts = \"level\"", "acts = \"level\"\nrestore_mode = \"RESTORE_DEFAULT_OFF\"")],
+        Refused("`restore_mode` is no key"),
+    ),
+    (
+        "ESPHome: code among the data",
+        V20,
+        &[("acts = \"level\"", "acts = \"level\"\nwrite_lambda = \"return x * 200;\"")],
+        Refused("`write_lambda` is no key"),
+    ),
+    (
+        "LinuxCNC mitsub_vfd: the computer link of letters, which is not Modbus",
+        GOODRIVE,
+        &[("protocol = \"modbus_rtu\"", "protocol = \"mitsubishi_computer_link\"")],
+        Refused("a protocol of letters"),
+    ),
+    (
+        "LinuxCNC vfs11_vfd: 0 for a stop, which gives run command and frequency away",
+        VFS15,
+        &[(
+            "ramp = { steps = [{ write = \"FA00\", words = [0xC000] }]",
+            "ramp = { steps = [{ write = \"FA00\", words = [0x0000] }]",
+        )],
+        Refused("the reset is left standing"),
+    ),
+    (
         "wb-mqtt-serial: the setup of the FC 51 writes 043Ch, and is written again on each reconnect",
         FC51,
         &[(
@@ -234,4 +276,60 @@ fn each_mistake_of_a_published_table_is_refused_or_moves_nothing() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n\n"));
+}
+
+/// Bits of which two sources say different things, by model or by reading: nothing that is shipped rests on them.
+const CONTRADICTED: &[(&str, &str, u16, &str)] = &[
+    (
+        "danfoss-fc",
+        "STW",
+        0xF000,
+        "12 is brake fault in one guide and stopped by itself in another, 14 current or torque, 15 thermal or timer",
+    ),
+    ("danfoss-fc51", "STW", 0xF000, "the same"),
+    ("v20", "ZSW", 0x0800, "11 is low at the current limit, or high while no torque limit is reached"),
+    ("g120", "ZSW", 0x0800, "the same"),
+    ("ms300", "STATE", 0x1000, "12 is running, standby included, of the GS4 alone"),
+];
+
+#[test]
+fn nothing_that_is_shipped_rests_on_a_bit_of_which_sources_contradict_each_other() {
+    for &(key, register, mask, why) in CONTRADICTED {
+        let file = shipped::find(key).expect("it is shipped").file();
+        assert!(file.register.contains_key(register), "{key}: {register}");
+        let told = [&file.see.at_setpoint, &file.see.warning, &file.state.standstill];
+        let owners = [&file.ownership.command, &file.ownership.reference];
+        let all = (file.state.is.iter().map(|is| is.get_ref().bits.get_ref()))
+            .chain(
+                told.into_iter()
+                    .filter_map(|answer| answer.given())
+                    .map(drive_profile::format::Spanned::get_ref),
+            )
+            .chain(owners.into_iter().filter_map(|answer| answer.given()).map(|owner| &owner.get_ref().bits));
+        for bits in all.filter(|bits| bits.register.get_ref() == register) {
+            assert_eq!(bits.mask.get_ref() & mask, 0, "{key} {register}: {why}");
+        }
+    }
+    // Printed 0028h is ZS, an output of 0 Hz: no shaft that stands. RUN is printed 0013h, and no trip.
+    for key in ["wj200", "mx2"] {
+        let file = shipped::find(key).expect("it is shipped").file();
+        assert!(file.state.standstill.given().is_none(), "{key}");
+        assert!(
+            file.register.values().all(|register| *register.get_ref().address.get_ref() != 0x28),
+            "{key}"
+        );
+        let rests =
+            file.state.is.iter().any(|is| is.get_ref().bits.get_ref().register.get_ref() == "RUN_OUTPUT");
+        assert!(!rests, "{key}");
+    }
+    // Without bit 10 a word is dropped by ABB DRV FULL.
+    let abb = shipped::find("acs550").expect("it is shipped");
+    for (name, requests) in abb.requests().into_iter().filter(|(name, _)| name.starts_with("stop.")) {
+        for request in requests {
+            let drive_core::tokio_modbus::Request::WriteSingleRegister(0, word) = request else {
+                panic!("{name}: {request:?}")
+            };
+            assert_eq!(word & 0x0400, 0x0400, "{name}");
+        }
+    }
 }

@@ -78,7 +78,14 @@ fn strangers() -> Vec<(String, String)> {
         let file = quoted.nth(1).filter(|file| file.ends_with(".py"))?;
         Some((key.to_owned(), file.to_owned()))
     });
-    kinds.collect()
+    // The drivers of LinuxCNC drive their twins.
+    let test = include_str!("../../../tests/linuxcnc.rs");
+    let drivers = test.split("Bench::of(\"").skip(1).filter_map(|rest| {
+        let key = rest.split('"').next()?;
+        let driver = rest.split("loadusr -W ").nth(1)?.split(' ').next()?;
+        Some((key.to_owned(), format!("LinuxCNC's {driver} (its twin)")))
+    });
+    kinds.chain(drivers).collect()
 }
 
 #[test]

@@ -1,9 +1,11 @@
 //! A drive from a file at every face: what it does not tell is told by none as a value, neither as zero nor as good; what is known is.
-#![cfg(unix)]
+#![cfg(target_os = "linux")]
 
 #[path = "mqtt/rig.rs"]
 mod rig;
 mod support;
+#[path = "support/terminal.rs"]
+mod terminal;
 
 use std::{
     fs,
@@ -11,7 +13,8 @@ use std::{
     net::TcpStream,
 };
 
-use support::{File, Running, Sim, free_port, get, path, run};
+use support::{File, Running, Sim, drived, free_port, get, path, run};
+use terminal::Terminal;
 
 /// What a WJ200 does not tell: which of two words of its output is first was not read, so that its file has no output.
 const OWNER: &str = "whether the drive tells who commands it is not known";
@@ -35,7 +38,7 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
     });
     let text = format!(
         "state = \"{}\"\n{mqtt}[http]\nlisten = \"127.0.0.1:{http}\"\n[[gateways]]\nlisten = \"127.0.0.1:{gateway}\"\n\
-         [lines.bench]\nport = \"{},19200,8N1\"\n[[drives]]\nline = \"bench\"\ndrive = \"wj200@3\"\nname = \"pump\"\ncontrol = true\n\
+         [groups]\npumps = [\"pump\"]\n[lines.bench]\nport = \"{},19200,8N1\"\n[[drives]]\nline = \"bench\"\ndrive = \"wj200@3\"\nname = \"pump\"\ncontrol = true\n\
          options = {{ highest = \"50Hz\", commands-alone = \"yes\" }}\n",
         state.display(),
         sim.link()
@@ -55,6 +58,11 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
         let (_, state, _) = ear.until(|topic, said| topic.ends_with("/state") && said["shows"] == "running");
         state.to_string()
     });
+    // On a terminal: what is not told is a dash there too.
+    let mut monitor = Terminal::start(&mut drived(&["monitor", "--socket", socket]), 120, 40);
+    let screen = monitor.wait_for("running");
+    monitor.press("q");
+    assert_eq!(monitor.end().0, Some(0), "{screen}");
     let none: &[&str] = &[];
     let rows = [
         Row {
@@ -69,6 +77,7 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
             has: &["running", "-/20.0"],
             lacks: none,
         },
+        Row { face: "monitor", said: screen, has: &["pump", "-/20.0"], lacks: none },
         Row {
             face: "API",
             said: get(http, "/api/v1/drives", "application/json"),
@@ -107,6 +116,10 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
     // What cannot be read is an exception, and no zero.
     assert_eq!(asked(gateway, 3, 0x2000), [0x83]);
     run(&["stop", "pump", "--socket", socket]).assert_done();
+    // All setpoints of a group come before its starts, and of this drive only a start shows one.
+    let started = run(&["start", "pumps", "--setpoint", "25Hz", "--socket", socket]);
+    assert_eq!(started.code, Some(0), "{started:?}");
+    run(&["stop", "pumps", "--socket", socket]).assert_done();
     let (code, last) = daemon.interrupt();
     assert_eq!(code, Some(0), "{last}");
     // The tools on the line, when nobody else holds it.

@@ -6,7 +6,9 @@ mod support;
 
 use std::{
     fs,
+    io::{BufRead as _, BufReader},
     path::{Path, PathBuf},
+    process::Stdio,
 };
 
 use support::{Ended, File, Running, Sim, drived, path, run};
@@ -134,6 +136,49 @@ fn the_environment_names_a_folder_for_every_subcommand_and_a_broken_file_there_s
     fs::write(folder.0.join("broken.toml"), "format = 1\n").expect("it can be written");
     let (code, said) = with(&["families"]);
     assert!(code == Some(0) && said.contains("broken.toml") && said.contains("atv312"), "{said}");
+}
+
+/// The acceleration ramp of a Goodrive, P00.11, with where a value lives.
+const RAMP: &str = "\n[register.P0011]\nwhat = \"acceleration time (P00.11)\"\naddress = 0x000B\naccess = \"read_write\"\nparameter = true\n\
+    storage = \"eeprom\"\nunit = \"s\"\nscale = [1, 10]\nrange = [0, 36000]\nsource = \"manuals\"\n\n[state]\n";
+
+#[test]
+fn parameters_of_a_drive_from_a_file_are_kept_compared_and_restored() {
+    let folder = Folder::new("restored");
+    let text = OWN.replace("key = \"goodrive\"", "key = \"own-drive\"").replacen("\n[state]\n", RAMP, 1);
+    fs::write(folder.0.join("own.toml"), text).expect("it can be written");
+    let (link, kept) = (path("restored-line"), path("restored-kept.toml"));
+    let (link, kept) = (link.to_str().expect("the path is text"), kept.to_str().expect("the path is text"));
+    let serve = ["sim", "--pty", link, "--drive", "own-drive@3", "--baud", "19200", "--format", "8E1"];
+    let mut sim = drived(&serve)
+        .env("DRIVED_PROFILES", &folder.0)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    let mut said = String::new();
+    BufReader::new(sim.stdout.as_mut().expect("it is piped")).read_line(&mut said).expect("it speaks");
+    let line = format!("{link},19200,8E1");
+    let on = |words: &[&str]| {
+        let words = [&["param"], words, &["--line", &line]].concat();
+        let output = drived(&words).env("DRIVED_PROFILES", &folder.0).output().expect("the program runs");
+        let told = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+        (output.status.code(), told.into_owned())
+    };
+    let right = |(code, told): (Option<i32>, String)| {
+        assert_eq!(code, Some(0), "{told}");
+        told
+    };
+    right(on(&["set", "--drive", "own-drive@3", "P0011", "3.0"]));
+    right(on(&["backup", "own-drive@3", "--to", kept]));
+    right(on(&["set", "--drive", "own-drive@3", "P0011", "4.5"]));
+    let (code, told) = on(&["diff", kept, "own-drive@3"]);
+    assert!(code == Some(1) && told.contains("P0011") && told.contains("4.5"), "{code:?} {told}");
+    right(on(&["restore", kept, "--write"]));
+    assert!(right(on(&["get", "--drive", "own-drive@3", "P0011"])).contains("3.0 s"));
+    sim.kill().expect("it runs");
+    sim.wait().expect("it ends");
+    let _ = fs::remove_file(kept);
 }
 
 fn configuration(folder: &Path, state: &Path, port: &str) -> String {

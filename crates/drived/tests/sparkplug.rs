@@ -61,16 +61,21 @@ impl Plant {
 
     /// The same without the daemon.
     fn prepare(name: &str, more: &str) -> Option<Self> {
+        Self::prepare_of("atv312@1-2", "", name, more)
+    }
+
+    /// The same of other drives, with what else their table says.
+    fn prepare_of(drives: &str, says: &str, name: &str, more: &str) -> Option<Self> {
         let broker = Mosquitto::start(name)?;
         let tap = Tap::start(broker.port, "-sparkplug");
-        let sim = Sim::serve(&format!("{name}-line"), &["atv312@1-2"]);
+        let sim = Sim::serve(&format!("{name}-line"), &[drives]);
         let state = path(&format!("{name}-bd-seq"));
         let _ = std::fs::remove_file(&state);
         let text = format!(
             "[http]\nlisten = \"off\"\n[mqtt]\nservers = [\"mqtt://127.0.0.1:{}\"]\ninterval = \"250ms\"\n\
              [mqtt.sparkplug]\ngroup = \"plant\"\nedge_node = \"hall 1\"\nstate = \"{}\"\n{more}\n\
-             [lines.north]\nport = \"{},19200,8E1\"\n[[drives]]\nline = \"north\"\ndrive = \"atv312@1-2\"\n\
-             name = \"pump {{}}\"\ncontrol = true\n",
+             [lines.north]\nport = \"{},19200,8E1\"\n[[drives]]\nline = \"north\"\ndrive = \"{drives}\"\n\
+             name = \"pump {{}}\"\ncontrol = true\n{says}\n",
             tap.port,
             state.display(),
             sim.link()
@@ -204,6 +209,27 @@ fn every_rule_holds_on_the_packets_of_a_long_session() {
     let (broken, untried) = rules::judge_all(&recording);
     assert!(broken.is_empty(), "{broken:#?}");
     assert!(untried.is_empty(), "{untried:#?}");
+}
+
+/// A WJ200, of whose file nothing shows the output, nor whose setpoint it goes by while it stands.
+#[test]
+fn a_drive_from_a_file_is_born_with_what_it_tells_and_takes_commands_as_the_others_do() {
+    let says = "options = { highest = \"50Hz\" }";
+    let Some(mut plant) = Plant::prepare_of("wj200@1-2", says, "sparkplug-profile", "commands = \"operate\"")
+    else {
+        return;
+    };
+    plant.run();
+    plant.wait_for("DBIRTH", "pump 1", 0);
+    let start = r#"{"id": "p-1", "action": "start", "setpoint": {"frequency_hz": 20}}"#;
+    plant.ask("pump 1", "p-1", start, "confirmed");
+    plant.wait_for_metric("pump 1", "Status/State", |metric| metric.text().as_deref() == Some("running"));
+    plant.ask("pump 1", "p-2", r#"{"id": "p-2", "action": "stop"}"#, "confirmed");
+    let recording = Recording::of(plant.tap.packets());
+    let output = last(&recording, "pump 1", "Status/Output Frequency");
+    assert!(output.is_none_or(|metric| metric.double().is_none()), "what it does not tell is no value");
+    let (code, _) = plant.daemon.take().expect("it runs").interrupt();
+    assert_eq!(code, Some(0));
 }
 
 #[test]

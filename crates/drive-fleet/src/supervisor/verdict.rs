@@ -31,7 +31,13 @@ impl Supervisor {
             Ok(()) => self.setpoint_given(now, setpoint),
             Err(error) => {
                 self.given = None;
+                let is_start =
+                    self.active.as_ref().is_some_and(|active| matches!(active.order, Order::Start { .. }));
                 match error.kind() {
+                    // What only a start shows, the start shows.
+                    ErrorKind::NotConfirmed if is_start && error.only_a_start_shows() => {
+                        self.setpoint_given(now, setpoint);
+                    }
                     ErrorKind::Refused | ErrorKind::Unsupported | ErrorKind::Exception => {
                         self.end_order(Outcome::Refused(error.into()));
                     }

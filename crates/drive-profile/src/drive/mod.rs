@@ -19,6 +19,9 @@ use crate::{ladder::Level, profile::Profile};
 use guards::Guarded;
 pub(crate) use plan::{Block, Words, is_double};
 
+/// Behind every so many statuses the command is read back, while one of this side stands: what it does shows in each.
+const STATUSES_PER_TURN: u16 = 4;
+
 /// A drive of a profile behind a port. See [`Drive`](drive_core::Drive) for what its methods promise; what its profile does not let
 /// them do is `Unsupported`, and says why.
 #[derive(Debug)]
@@ -29,6 +32,8 @@ pub struct ProfileDrive<P> {
     slow: Vec<Block>,
     /// What reads the code of the present fault, where no status does.
     code: Option<Block>,
+    /// What reads the command back, where no status does.
+    command: Option<Block>,
     owner: Owner,
     watch: Watch,
     guarded: Guarded,
@@ -47,7 +52,7 @@ impl<P: Port> ProfileDrive<P> {
     #[must_use]
     pub fn new(port: P, slave: SlaveAddress, profile: Arc<Profile>, owner: Owner) -> Self {
         let registers = Registers::new(port, slave, profile.capabilities(), meaning);
-        let (fast, slow, code) = (profile.fast(), profile.slow(), profile.code());
+        let (fast, slow, code, command) = (profile.fast(), profile.slow(), profile.code(), profile.command());
         let guarded = Guarded::of(&profile);
         Self {
             registers,
@@ -55,8 +60,9 @@ impl<P: Port> ProfileDrive<P> {
             fast,
             slow,
             code,
+            command,
             owner,
-            watch: Watch::default(),
+            watch: Watch::every(STATUSES_PER_TURN),
             guarded,
             agreed: None,
             kept: None,

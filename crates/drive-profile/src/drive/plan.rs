@@ -110,17 +110,33 @@ impl Profile {
         let owners =
             [&file.ownership.command, &file.ownership.reference].into_iter().filter_map(Answer::given);
         names.extend(owners.map(|owner| name(&owner.get_ref().bits.register)));
-        names.extend(file.ownership.reads_back.given().map(|read| name(&read.get_ref().register)));
-        let blocks = self.blocks(&names);
-        // The code of a fault is read along where it costs no exchange; else once there is a fault.
-        names.extend(given(&file.faults.present));
-        let with_code = self.blocks(&names);
-        if with_code.len() == blocks.len() { with_code } else { blocks }
+        let mut blocks = self.blocks(&names);
+        // Read along where it costs no exchange; else the command in its turn, and the code once there is a fault.
+        let reads_back = file.ownership.reads_back.given().map(|read| name(&read.get_ref().register));
+        for also in [reads_back, given(&file.faults.present)].into_iter().flatten() {
+            names.insert(also);
+            let with = self.blocks(&names);
+            if with.len() == blocks.len() {
+                blocks = with;
+            } else {
+                names.remove(also);
+            }
+        }
+        blocks
     }
 
     /// What reads the code of the present fault, where a status does not.
     pub(crate) fn code(&self) -> Option<Block> {
-        let name = given(&self.file.faults.present)?;
+        self.apart(given(&self.file.faults.present)?)
+    }
+
+    /// What reads the command back, where a status does not.
+    pub(crate) fn command(&self) -> Option<Block> {
+        self.apart(name(&self.file.ownership.reads_back.given()?.get_ref().register))
+    }
+
+    /// What reads a register that no status reads.
+    fn apart(&self, name: &str) -> Option<Block> {
         let (_, space, address) = self.place_of(name)?;
         let holds = |block: &Block| {
             let at = address.checked_sub(block.first);

@@ -69,6 +69,10 @@ impl<P: Port> ProfileDrive<P> {
     pub(super) async fn read_status(&mut self, class: Class) -> Result<(Status, Words)> {
         let blocks = self.fast.clone();
         let mut words = self.read_blocks(class, &blocks).await?;
+        if let Some(block) = self.command.filter(|_| self.wants_command(class)) {
+            let read = self.read_block(class, block).await.inspect_err(|_| self.watch.turns.again())?;
+            words.keep(block, read);
+        }
         let mut status = self.explain(&words);
         if let Some(block) = self.code.filter(|_| status.is_fault()) {
             // That it has tripped is told in any case.
@@ -83,6 +87,14 @@ impl<P: Port> ProfileDrive<P> {
         let evidence = self.evidence(&status, &words);
         status.verdict = self.watch.run.verdict(&evidence);
         Ok((status, words))
+    }
+
+    /// Whether the command is to be read back: of a command each time; else while one of this side stands, in its turn, or at once where
+    /// nobody knows what the drive holds.
+    fn wants_command(&mut self, class: Class) -> bool {
+        let stands = self.watch.run.lease().is_some();
+        class == Class::Command
+            || stands && (self.watch.turns.pass(1).is_some() || self.watch.run.held().is_none())
     }
 
     /// The verdict of a status for its own sake, which ends a run command that stands no more.
@@ -282,7 +294,7 @@ impl<P: Port> ProfileDrive<P> {
         }
     }
 
-    fn owned(&self, words: &Words, owner: Option<&OwnerBits>) -> Told {
+    pub(super) fn owned(&self, words: &Words, owner: Option<&OwnerBits>) -> Told {
         let Some(owner) = owner else { return Told::NotTold };
         match (self.profile.fits(words, &owner.bits), owner.proves) {
             (Some(true), Proves::Bus) => Told::Yes,

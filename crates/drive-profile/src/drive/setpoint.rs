@@ -2,7 +2,7 @@
 
 use drive_core::{
     Class, Command as Order, Confirming, Control, Error, ErrorKind, Frequency, Lease, Port, Refusal, Result,
-    SETTLED_WITHIN, Setpoint, SetpointProblem, Speed, State, Status, Verdict,
+    SETTLED_WITHIN, Setpoint, SetpointProblem, Speed, State, Status, Told, Verdict,
 };
 
 use tokio::time::Instant;
@@ -14,10 +14,15 @@ use crate::{
     scale::{counts, hundredths},
 };
 
-const KEPT: Refusal = Refusal::Overridden {
-    by: "nothing yet: its setpoint is its run command, so that nothing was written; the next start",
-    remedy: "start it",
-};
+const KEPT: Refusal = Refusal::OnlyAStartShows(
+    "its setpoint is its run command, so that nothing was written: the next start gives it",
+);
+const READS_BACK: Refusal = Refusal::OnlyAStartShows(
+    "its register reads back as it was written, and the drive does not tell whose setpoint it goes by: start it, and see its output",
+);
+const NOT_SHOWN: Refusal = Refusal::OnlyAStartShows(
+    "it was written, and its profile has no register that holds the setpoint in force: start it, and see its output",
+);
 const HELD_BACK: Refusal = Refusal::Settings(
     "its setpoint is its run command, and the motor does not run by the one that was given: stop it, then start it",
 );
@@ -27,9 +32,9 @@ const NO_FULL_SCALE: Refusal = Refusal::Settings(
 );
 const NO_HIGHEST: Refusal =
     Refusal::Settings("the drive does not tell how fast it may turn: say it by highest");
-const UNSEEN: Refusal = Refusal::Overridden {
-    by: "nothing that the drive shows: its profile has no register that holds the setpoint in force; the output",
-    remedy: "start it, and see its output",
+const NOT_FOLLOWED: Refusal = Refusal::Overridden {
+    by: "something that the drive does not tell: its motor runs, and its output was not seen to go to this setpoint; another setpoint, perhaps,",
+    remedy: "see whose reference the drive goes by",
 };
 
 impl<P: Port> ProfileDrive<P> {
@@ -244,14 +249,17 @@ impl<P: Port> ProfileDrive<P> {
         }
     }
 
-    /// It is there where the drive shows it. Where what takes it is all that shows it, a motor that runs has to bear it out: its own word
-    /// that reads back says that it arrived, and not that it is in force.
+    /// It is in force where another register than its own shows it, or where its own holds it and the drive tells that its reference is the
+    /// bus's. Else a motor that runs has to bear it out, for many a drive echoes what it does not go by; while none runs only a start shows
+    /// it, and that is said.
     async fn see_setpoint(&mut self, setpoint: Setpoint, word: u16) -> Result<()> {
         let order = Order::Setpoint(setpoint);
-        let file = self.profile.file();
+        let profile = self.profile.clone();
+        let file = profile.file();
         let taken = file.setpoint.given().map(|fact| fact.get_ref().register.get_ref());
         let seen = file.see.setpoint.given().map(crate::format::Spanned::get_ref);
-        let (shows, is_echo) = (seen.is_some(), seen == taken && !file.starts_by_setpoint());
+        let is_echo = seen.is_none() || seen == taken && !file.starts_by_setpoint();
+        let reference = file.ownership.reference.given().map(crate::format::Spanned::get_ref);
         let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
         let mut first = None;
         loop {
@@ -261,39 +269,48 @@ impl<P: Port> ProfileDrive<P> {
                 Err(error) if error.kind() == ErrorKind::NoAnswer && confirming.again().await => continue,
                 Err(error) => return Err(error),
             };
-            let local = (status.control == Some(Control::Local)).then_some(OTHERS);
-            let held = match setpoint {
-                Setpoint::Frequency(frequency) => status.reference == Some(frequency),
-                _ => {
-                    self.profile
-                        .file()
-                        .see
-                        .setpoint
-                        .given()
-                        .and_then(|name| self.profile.word(&words, name.get_ref()))
-                        == Some(word)
-                }
+            let others = self.commanded_by_other(&words);
+            let held = match (setpoint, seen) {
+                (_, None) => true,
+                (Setpoint::Frequency(frequency), _) => status.reference == Some(frequency),
+                (_, Some(name)) => profile.word(&words, name) == Some(word),
             };
-            let is_borne_out = !is_echo
-                || status.state != State::Running
-                || follows(&status, first)
-                    .unwrap_or_else(|| status.at_reference == Some(true) && Instant::now() >= settled);
+            let asked = if let Setpoint::Frequency(frequency) = setpoint {
+                Some(frequency)
+            } else {
+                status.reference
+            };
+            let is_bus = seen.is_some() && self.owned(&words, reference) == Told::Yes;
+            let runs = status.state == State::Running;
+            let is_borne_out = if runs {
+                !is_echo
+                    || follows(&status, asked, first)
+                        .unwrap_or_else(|| status.at_reference == Some(true) && Instant::now() >= settled)
+            } else {
+                !is_echo || is_bus
+            };
             first = first.or(status.output_frequency);
-            if held && is_borne_out && local.is_none() {
+            if held && is_borne_out && others.is_none() {
                 self.agreed = self.setpoint_seen(&words);
                 return Ok(());
             }
-            if !shows || !confirming.again().await {
-                let unseen = (!shows || held && !is_borne_out).then_some(UNSEEN);
-                return Err(self.not_confirmed(order, status, local.or(unseen)));
+            let only_a_start = held && !runs && others.is_none();
+            if only_a_start || !confirming.again().await {
+                let unseen = match seen {
+                    _ if !held || is_borne_out => None,
+                    _ if runs => Some(NOT_FOLLOWED),
+                    Some(_) => Some(READS_BACK),
+                    None => Some(NOT_SHOWN),
+                };
+                return Err(self.not_confirmed(order, status, others.or(unseen)));
             }
         }
     }
 }
 
 /// Whether an output is at the setpoint, or was seen to go towards it; `None`: the drive does not show both.
-fn follows(status: &Status, first: Option<Frequency>) -> Option<bool> {
-    let (output, setpoint) = (status.output_frequency?, status.reference?);
+fn follows(status: &Status, setpoint: Option<Frequency>, first: Option<Frequency>) -> Option<bool> {
+    let (output, setpoint) = (status.output_frequency?, setpoint?);
     let is_there = !has_fallen(output, Some(setpoint)) && !has_fallen(setpoint, Some(output));
     let comes = first.is_some_and(|first| {
         if first > setpoint { has_fallen(output, Some(first)) } else { has_fallen(first, Some(output)) }

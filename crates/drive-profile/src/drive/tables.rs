@@ -49,6 +49,7 @@ impl Profile {
         let (fast, slow) = (self.fast(), self.slow());
         let unit = self.setpoint_unit();
         let status_exchanges = u8::try_from(fast.len()).unwrap_or(u8::MAX);
+        let command_exchanges = u8::from(self.command().is_some());
         interned::one(Capabilities {
             functions: interned::list(&functions),
             read_words: link.read_words.given().copied().unwrap_or(1),
@@ -72,8 +73,11 @@ impl Profile {
             turnaround: Duration::from_millis(link.pause_ms.given().copied().unwrap_or(0).into()),
             status_exchanges,
             status_words: fast.iter().filter(|block| !block.space.is_bit()).map(|block| block.count).sum(),
-            statuses_per_turn: 0,
-            stop_exchanges: status_exchanges.saturating_mul(3).saturating_add(2),
+            statuses_per_turn: if command_exchanges == 0 { 0 } else { super::STATUSES_PER_TURN },
+            stop_exchanges: status_exchanges
+                .saturating_add(command_exchanges)
+                .saturating_mul(3)
+                .saturating_add(2),
             measurement_exchanges: u8::try_from(slow.len()).unwrap_or(u8::MAX),
             quantities: interned::list(&self.quantities()),
             ..least

@@ -74,27 +74,18 @@ fn read_bits(
     first: u16,
     count: u16,
 ) -> Result<Vec<u8>, Exception> {
-    let most = machine.most_bits().0;
-    if count == 0 || count > most {
-        return Err(Exception::ILLEGAL_VALUE);
-    }
+    let places = places(space, first, count, machine.most_bits().0)?;
     let bytes = u8::try_from(count.div_ceil(8)).map_err(|_| Exception::ILLEGAL_VALUE)?;
-    let (mut answer, mut named) = (vec![0; 2 + usize::from(bytes)], false);
-    for at in 0..count {
-        let address = first.checked_add(at).ok_or(Exception::ILLEGAL_ADDRESS)?;
-        // A drive has more bits than its profile names, and reads those between as 0 (Hitachi WJ-C1 11-2-2).
-        let held = machine.read_at((space, address));
-        named |= held.is_ok();
-        let bit = u8::from(held.is_ok_and(|held| held != 0));
-        if let Some(byte) = answer.get_mut(2 + usize::from(at / 8)) {
-            *byte |= bit << (at % 8);
-        }
-    }
-    if !named {
+    // A drive has more bits than its profile names, and reads those between as 0 (Hitachi WJ-C1 11-2-2).
+    let bits: Vec<_> = places.into_iter().map(|place| machine.read_at(place)).collect();
+    if bits.iter().all(Result::is_err) {
         return Err(Exception::ILLEGAL_ADDRESS);
     }
-    answer.splice(..2, [function, bytes]);
-    Ok(answer)
+    let packed = bits.chunks(8).map(|bits| {
+        let on = bits.iter().map(|bit| u8::from(matches!(bit, Ok(held) if *held != 0)));
+        on.zip(0..).fold(0, |byte, (on, at)| byte | on << at)
+    });
+    Ok([function, bytes].into_iter().chain(packed).collect())
 }
 
 fn read_words(
@@ -104,15 +95,11 @@ fn read_words(
     first: u16,
     count: u16,
 ) -> Result<Vec<u8>, Exception> {
-    let most = machine.most_words();
-    if count == 0 || count > most {
-        return Err(Exception::ILLEGAL_VALUE);
-    }
+    let places = places(space, first, count, machine.most_words())?;
     let bytes = u8::try_from(2 * count).map_err(|_| Exception::ILLEGAL_VALUE)?;
     let mut answer = vec![function, bytes];
-    for at in 0..count {
-        let address = first.checked_add(at).ok_or(Exception::ILLEGAL_ADDRESS)?;
-        answer.extend(machine.read_at((space, address))?.to_be_bytes());
+    for place in places {
+        answer.extend(machine.read_at(place)?.to_be_bytes());
     }
     Ok(answer)
 }
@@ -124,17 +111,12 @@ fn write_words(
     bytes: usize,
     data: &[u8],
 ) -> Result<(), Exception> {
-    let fits = bytes == usize::from(count) * 2 && data.len() == bytes;
-    if count == 0 || count > machine.most_written() || !fits {
+    let places = places(Space::HoldingRegister, first, count, machine.most_written())?;
+    if bytes != usize::from(count) * 2 || data.len() != bytes {
         return Err(Exception::ILLEGAL_VALUE);
     }
-    let words = data.chunks_exact(2).zip(0_u16..).map(|(word, at)| {
-        let value = u16::from_be_bytes(word.try_into().unwrap_or_default());
-        Some(Written { space: Space::HoldingRegister, address: first.checked_add(at)?, value })
-    });
-    let words: Vec<Written> = words.collect::<Option<_>>().ok_or(Exception::ILLEGAL_ADDRESS)?;
-    words.iter().try_for_each(|word| machine.takes((word.space, word.address)))?;
-    words.into_iter().try_for_each(|word| machine.write_at(word))
+    let words = data.chunks_exact(2).map(|word| u16::from_be_bytes(word.try_into().unwrap_or_default()));
+    write(machine, places, words)
 }
 
 fn write_bits(
@@ -144,21 +126,30 @@ fn write_bits(
     bytes: usize,
     data: &[u8],
 ) -> Result<(), Exception> {
-    let most = machine.most_bits().1;
-    let fits = bytes == usize::from(count.div_ceil(8)) && data.len() == bytes;
-    if count == 0 || count > most || !fits {
+    let places = places(Space::Coil, first, count, machine.most_bits().1)?;
+    if bytes != usize::from(count.div_ceil(8)) || data.len() != bytes {
         return Err(Exception::ILLEGAL_VALUE);
     }
-    let coil = |at: u16| {
-        let byte = data.get(usize::from(at / 8)).copied().unwrap_or(0);
-        Some(Written {
-            space: Space::Coil,
-            address: first.checked_add(at)?,
-            value: u16::from(byte >> (at % 8) & 1),
-        })
-    };
-    let coils: Option<Vec<Written>> = (0..count).map(coil).collect();
-    let coils = coils.ok_or(Exception::ILLEGAL_ADDRESS)?;
-    coils.iter().try_for_each(|coil| machine.takes((coil.space, coil.address)))?;
-    coils.into_iter().try_for_each(|coil| machine.write_at(coil))
+    let coils = data.iter().flat_map(|byte| (0..8).map(move |at| u16::from(byte >> at & 1)));
+    write(machine, places, coils)
+}
+
+/// So many places in a row, of the most that a request may have.
+fn places(space: Space, first: u16, count: u16, most: u16) -> Result<Vec<(Space, u16)>, Exception> {
+    if count == 0 || count > most {
+        return Err(Exception::ILLEGAL_VALUE);
+    }
+    let all = (0..count).map(|at| Some((space, first.checked_add(at)?)));
+    all.collect::<Option<_>>().ok_or(Exception::ILLEGAL_ADDRESS)
+}
+
+/// All of them, or none where one of them cannot be written.
+fn write(
+    machine: &mut dyn Places,
+    places: Vec<(Space, u16)>,
+    values: impl Iterator<Item = u16>,
+) -> Result<(), Exception> {
+    places.iter().try_for_each(|place| machine.takes(*place))?;
+    let mut all = places.into_iter().zip(values);
+    all.try_for_each(|((space, address), value)| machine.write_at(Written { space, address, value }))
 }

@@ -11,7 +11,7 @@ use drive_core::{Direction, Error, Frequency, StopMode};
 use drive_sim::Observation;
 use tokio::time::{Instant, sleep};
 
-use super::Contract;
+use super::{Contract, is_given};
 use crate::{
     recorder::{Habit, Recorder, Witness},
     rig::Rig,
@@ -78,7 +78,7 @@ impl Stage {
         let given = self.rig.drive.set_setpoint(SETPOINT.into()).await;
         let started = self.rig.drive.start(Direction::Forward).await;
         self.live(SETTLED).await;
-        if given.is_err() || started.is_err() || !self.seen().running {
+        if !is_given(&given) || started.is_err() || !self.seen().running {
             self.blame(format!(
                 "a plain start does not run the motor: {given:?}, {started:?}, {:?}",
                 self.seen()

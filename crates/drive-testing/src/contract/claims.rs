@@ -6,7 +6,7 @@ use drive_core::{Direction, Error, ErrorKind, Frequency, Percent, Reaction, Spee
 
 use tokio::time::Instant;
 
-use super::Contract;
+use super::{Contract, is_given};
 use crate::rig::Rig;
 
 const REACTIONS: [Reaction; 6] = [
@@ -27,7 +27,8 @@ impl Contract {
     /// What the family claims it does, and what it does not claim is `Unsupported`.
     pub async fn does_what_it_claims(&self) {
         let (mut rig, claims, name) = (self.rig(), self.capabilities, self.name());
-        rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("every family takes hertz");
+        let by_hertz = rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await;
+        assert!(is_given(&by_hertz), "{name}: every family takes hertz: {by_hertz:?}");
         let by_speed = rig.drive.set_setpoint(Speed::from_rpm(900).into()).await;
         assert_eq!(is_unsupported(by_speed), !claims.speed_setpoint, "{name}: a setpoint in rpm");
         // Whoever takes one takes it where it is set up to count so.
@@ -108,7 +109,8 @@ impl Contract {
         assert_ne!(status.state, State::Unknown, "{name}");
         rig.drive.measurements().await.expect("it measures");
         assert_eq!(exchanges(&mut rig).await, claimed, "{name} stands: of a status, of the measurements");
-        rig.drive.set_setpoint(Frequency::from_hertz(25).into()).await.expect("it takes 25 Hz");
+        let given = rig.drive.set_setpoint(Frequency::from_hertz(25).into()).await;
+        assert!(is_given(&given), "{name}: it takes 25 Hz: {given:?}");
         rig.drive.start(Direction::Forward).await.expect("it starts");
         rig.until_at(Frequency::from_hertz(25)).await;
         // What only a turning motor shows is looked for once.

@@ -149,3 +149,9 @@ impl Contract {
         self.capabilities.name
     }
 }
+
+/// Whether a setpoint was given: it is in force, or nothing speaks against it and only a start shows it, as of a drive whose register does no
+/// more than read back.
+pub(crate) fn is_given(given: &drive_core::Result<()>) -> bool {
+    given.as_ref().err().is_none_or(drive_core::Error::only_a_start_shows)
+}

@@ -6,7 +6,7 @@ use drive_core::{
     Command, Direction, Error, ErrorKind, Frequency, Motion, Reaction, Refusal, State, Status, StopMode,
 };
 
-use super::{Contract, claims::reset};
+use super::{Contract, claims::reset, is_given};
 use crate::rig::Rig;
 
 const SETPOINT: Frequency = Frequency::from_hertz(30);
@@ -43,13 +43,19 @@ async fn nothing_moves_at_first(rig: &mut Rig) {
 }
 
 async fn it_starts_and_reaches_its_reference(rig: &mut Rig) {
-    rig.drive.set_setpoint(SETPOINT.into()).await.expect("30 Hz is within its limits");
+    give(rig).await;
     assert!(!rig.machine.observe().running, "a setpoint is no start");
     let status = rig.drive.start(Direction::Forward).await.expect("it starts");
     assert_eq!(status.state, State::Running);
     let status = rig.until_at(SETPOINT).await;
     assert_eq!(status.direction, Some(Direction::Forward));
     assert_eq!(rig.machine.observe().output_frequency, 3_000);
+}
+
+/// Gives it its setpoint.
+async fn give(rig: &mut Rig) {
+    let given = rig.drive.set_setpoint(SETPOINT.into()).await;
+    assert!(is_given(&given), "30 Hz is within its limits: {given:?}");
 }
 
 async fn it_reverses(rig: &mut Rig) {
@@ -106,7 +112,7 @@ async fn it_trips_says_why_and_stays_still_after_the_reset(rig: &mut Rig, trip: 
     rig.poll_for(Duration::from_secs(5)).await;
     assert!(!rig.machine.observe().running, "a reset is no start");
     // A reset may take the reference with it.
-    rig.drive.set_setpoint(SETPOINT.into()).await.expect("30 Hz is within its limits");
+    give(rig).await;
     rig.drive.start(Direction::Forward).await.expect("it starts again when it is told to");
     rig.until_at(SETPOINT).await;
     rig.drive.stop(StopMode::Ramp).await.expect("it stops");

@@ -66,6 +66,8 @@ struct Paper {
     withholds_stops: Option<Refusal>,
     /// It takes every stop and goes on, because.
     denies_stops: Option<Refusal>,
+    /// A setpoint is not confirmed, for this reason.
+    denies_setpoints: Option<Refusal>,
     /// The run command of this side that it holds.
     lease: Option<Lease>,
     /// The run command that stands in it, whoever has given it, once one of before was taken for ours.
@@ -120,6 +122,7 @@ impl Paper {
             expires_stops: false,
             withholds_stops: None,
             denies_stops: None,
+            denies_setpoints: None,
             lease: None,
             held: None,
             says: None,
@@ -251,6 +254,11 @@ impl Paper {
                     if self.status.state == State::Running {
                         self.run();
                     }
+                }
+                if let because @ Some(_) = self.denies_setpoints {
+                    let (slave, command) = (slave(), Command::Setpoint(setpoint));
+                    let status = Box::new(self.status.clone());
+                    return Reply::Setpoint(Err(Error::NotConfirmed { slave, command, status, because }));
                 }
                 Reply::Setpoint(self.result(()))
             }

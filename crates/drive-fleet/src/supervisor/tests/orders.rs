@@ -14,6 +14,28 @@ fn a_start_gives_the_setpoint_first_and_is_confirmed_at_the_reference() {
     assert_eq!(rig.snapshot().setpoint, Some(setpoint));
 }
 
+/// A drive from a file whose register of the setpoint does no more than read back.
+#[test]
+fn a_start_goes_on_behind_a_setpoint_that_only_a_start_shows_and_behind_no_other_that_is_not_confirmed() {
+    let setpoint = Frequency::from_hertz(40).into();
+    for (because, starts) in
+        [(Refusal::OnlyAStartShows("a test"), true), (Refusal::Settings("a test"), false)]
+    {
+        let mut rig = Rig::ready();
+        rig.drive.denies_setpoints = Some(because);
+        let id = rig.order(run_at(40));
+        rig.pass(500 * MS);
+        assert_eq!(rig.outcome(id).is_some_and(Outcome::is_confirmed), starts, "{because}");
+        let mut writes = vec![Job::SetSetpoint(setpoint)];
+        writes.extend(starts.then_some(Job::Start(Direction::Forward)));
+        assert_eq!(rig.drive.writes(), writes, "{because}");
+        // Alone it is what it is.
+        let id = rig.order(Order::Setpoint { setpoint, until: Until::InForce });
+        rig.pass(500 * MS);
+        assert!(matches!(rig.outcome(id), Some(Outcome::NotConfirmed(Unconfirmed::Denied(_)))), "{because}");
+    }
+}
+
 #[test]
 fn an_order_that_was_not_sent_in_its_lifetime_expires_and_is_never_sent() {
     let mut rig = Rig::ready();

@@ -6,7 +6,7 @@ use drive_core::{Class, Direction, StopMode, Withdrawn};
 
 use super::{Complaint, OTHER, SETPOINT, SETTLED, Stage};
 use crate::{
-    contract::Contract,
+    contract::{Contract, is_given},
     recorder::{Habit, Heard},
 };
 
@@ -141,7 +141,7 @@ impl Contract {
     pub(super) async fn disobeyed(&self) -> Vec<Complaint> {
         let mut stage = self.stage("nothing is confirmed that the drive does not do").await;
         let given = stage.rig.drive.set_setpoint(SETPOINT.into()).await;
-        if given.is_err() {
+        if !is_given(&given) {
             stage.blame(format!("a plain setpoint is not confirmed: {given:?}"));
         }
         stage.witness.from_now_on(Habit::KeepsItsWords);

@@ -6,7 +6,12 @@ use drive_core::{Status, StopMode, Verdict};
 use tokio::time::{Instant, sleep};
 
 use super::{Complaint, OTHER, SETPOINT, SETTLED, Stage};
-use crate::{contract::Contract, recorder::Habit, truth::contradiction, words::words_written};
+use crate::{
+    contract::{Contract, is_given},
+    recorder::Habit,
+    truth::contradiction,
+    words::words_written,
+};
 
 /// How long a reference of another may be taken for ours: longer than every turn of the families takes at this pace.
 const TOLD_WITHIN: Duration = Duration::from_secs(60);
@@ -109,19 +114,20 @@ impl Contract {
         }
         sleep(Duration::from_millis(500)).await;
         let end = Instant::now() + TOLD_WITHIN;
+        let mut verdict = None;
         while Instant::now() < end {
             let status = stage.rig.drive.status().await;
             let seen = stage.seen();
-            let is_told =
-                status.is_ok_and(|status| matches!(status.verdict, Some(Verdict::NotInForce { .. })));
-            if is_told || !seen.running || seen.setpoint == before {
+            verdict = status.map_or(verdict, |status| status.verdict);
+            if matches!(verdict, Some(Verdict::NotInForce { .. })) || !seen.running || seen.setpoint == before
+            {
                 return stage.complaints;
             }
             sleep(Duration::from_millis(400)).await;
         }
         let seen = stage.seen();
         stage.blame(format!(
-            "another master wrote {word:04X}h to {register:04X}h {TOLD_WITHIN:?} ago, and it is told in force; {seen:?}"
+            "another master wrote {word:04X}h to {register:04X}h {TOLD_WITHIN:?} ago, and the verdict is {verdict:?}; {seen:?}"
         ));
         stage.complaints
     }
@@ -134,7 +140,7 @@ impl Stage {
         let mut written = Vec::new();
         for setpoint in [SETPOINT, OTHER, SETPOINT] {
             let since = Instant::now();
-            self.rig.drive.set_setpoint(setpoint.into()).await.ok()?;
+            is_given(&self.rig.drive.set_setpoint(setpoint.into()).await).then_some(())?;
             let received = self.rig.machine.received_since(since);
             written.push(received.iter().flat_map(|request| words_written(&request.pdu)).collect::<Vec<_>>());
         }

@@ -8,7 +8,7 @@ use tokio::time::sleep;
 
 use super::{Configuration, Event, Judge, Scene, Surrounded};
 use crate::{
-    contract::Contract,
+    contract::{Contract, is_given},
     truth::{TOLERANCE, contradiction},
 };
 
@@ -199,7 +199,7 @@ impl<'a> Cell<'a> {
     }
 
     async fn give(&mut self, hertz: u16) -> bool {
-        self.scene.drive.set_setpoint(Frequency::from_hertz(hertz).into()).await.is_ok()
+        is_given(&self.scene.drive.set_setpoint(Frequency::from_hertz(hertz).into()).await)
     }
 
     /// Runs at 20 Hz. Whether that is confirmed.

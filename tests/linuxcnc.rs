@@ -1,0 +1,151 @@
+//! LinuxCNC's own drivers of spindle drives, which run real ones in workshops, drive our simulated ones over a pty: they were written by
+//! another hand, from drives and not from documents. `DRIVED_LINUXCNC` names the folder into which its Debian packages were unpacked.
+#![cfg(unix)]
+
+use std::{
+    env,
+    path::{Path, PathBuf},
+    process::Stdio,
+    sync::Arc,
+    time::Duration,
+};
+
+use drive_core::SerialSettings;
+use drive_families::{Family, SetUp};
+use drive_profile::{definition, shipped};
+use drive_sim::{Observation, Serving, SimLine, SimSlave, Wiring};
+use drive_testing::peers::{is_there, runs};
+use tokio::{
+    io::{AsyncBufReadExt as _, AsyncWriteExt as _, BufReader, Lines},
+    process::{Child, ChildStdin, ChildStdout, Command},
+    time::{sleep, timeout},
+};
+
+/// Longer than any of this takes on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+#[tokio::test(flavor = "multi_thread")]
+async fn linuxcnc_runs_turns_round_stops_and_resets_a_simulated_wj200() {
+    let Some(folder) = folder() else { return };
+    let bench = Bench::of("wj200", "9600 8N1");
+    let load = format!("loadusr -W wj200_vfd --device {} --baud 9600", bench.port.display());
+    let mut hal = Hal::start(&folder, &load).await;
+    let pin = |name: &str| format!("wj200-vfd.0.{name}");
+    hal.set(&pin("enable"), "1").await;
+    hal.set(&pin("commanded-frequency"), "30").await;
+    hal.set(&pin("run"), "1").await;
+    hal.set(&pin("mbslaveaddr"), "1").await;
+    bench.until("30 Hz forward", |seen| seen.output_frequency == 3_000).await;
+    hal.until(&pin("is-running"), "TRUE").await;
+    hal.until(&pin("is-at-speed"), "TRUE").await;
+    hal.set(&pin("reverse"), "1").await;
+    bench.until("30 Hz in reverse", |seen| seen.output_frequency == -3_000).await;
+    hal.set(&pin("commanded-frequency"), "20").await;
+    bench.until("20 Hz in reverse", |seen| seen.output_frequency == -2_000).await;
+    hal.set(&pin("run"), "0").await;
+    bench.until("rest", |seen| !seen.running && seen.shaft_frequency == 0).await;
+    hal.until(&pin("is-running"), "FALSE").await;
+    // It resets a trip by itself as long as it is enabled, and is not told to run here.
+    bench.machine.trip(9);
+    bench.until("the reset", |seen| seen.trip.is_none()).await;
+    assert!(!bench.machine.observe().running, "a reset is no start");
+    hal.until(&pin("is-alarm"), "FALSE").await;
+    hal.end().await;
+}
+
+/// The folder of its packages.
+fn folder() -> Option<PathBuf> {
+    let folder = env::var_os("DRIVED_LINUXCNC").map(PathBuf::from);
+    let found = folder.filter(|folder| folder.join("usr/bin/halcmd").is_file());
+    is_there(found.is_some(), "LinuxCNC (DRIVED_LINUXCNC)").then_some(found).flatten()
+}
+
+/// A simulated drive of a profile at address 1 on a pty.
+struct Bench {
+    port: PathBuf,
+    machine: SimSlave,
+    _serving: Serving,
+}
+
+impl Bench {
+    fn of(key: &str, settings: &str) -> Self {
+        let settings: SerialSettings = settings.parse().expect("it is a setting of a line");
+        let profile = shipped::find(key).expect("it is shipped").clone();
+        let family = Family::new(definition(&Arc::new(profile)));
+        let line = SimLine::new(Wiring::rtu(settings));
+        let machine = family.machine(SetUp::ForTheBus).expect("it has a twin");
+        let machine = line.add_boxed(1, machine).expect("address 1 is free");
+        let port = env::temp_dir().join(format!("drived-linuxcnc-{key}-{}", std::process::id()));
+        let serving = line.serve_pty(&port).expect("a pty can be had");
+        Self { port, machine, _serving: serving }
+    }
+
+    async fn until(&self, what: &str, is_so: impl Fn(&Observation) -> bool) {
+        let seen = timeout(PATIENCE, self.machine.wait_until(is_so)).await;
+        assert!(seen.is_ok(), "never {what}: {:?}", self.machine.observe());
+    }
+}
+
+/// LinuxCNC's hardware layer, to which its drivers belong: told by lines.
+struct Hal {
+    told: ChildStdin,
+    says: Lines<BufReader<ChildStdout>>,
+    child: Child,
+}
+
+impl Hal {
+    async fn start(folder: &Path, load: &str) -> Self {
+        let (bin, lib) = (folder.join("usr/bin"), folder.join("usr/lib"));
+        let path = env::var("PATH").unwrap_or_default();
+        // Its memory is one of the whole machine, and its drivers outlive it: where that may be, it gets a space of its own.
+        const APART: &[&str] = &["--ipc", "--pid", "--fork", "--kill-child"];
+        let can = runs("unshare", &[APART, &["true"]].concat());
+        let apart = if can { [&["unshare"], APART].concat() } else { Vec::new() };
+        let program = bin.join("halcmd").display().to_string();
+        let words: Vec<&str> = apart.iter().copied().chain([&*program, "-k", "-f"]).collect();
+        let (first, rest) = words.split_first().expect("there is one");
+        let mut child = Command::new(first)
+            .args(rest)
+            .env("PATH", format!("{}:{path}", bin.display()))
+            .env("LD_LIBRARY_PATH", format!("{0}:{0}/x86_64-linux-gnu", lib.display()))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .kill_on_drop(true)
+            .spawn()
+            .expect("it can be run");
+        let told = child.stdin.take().expect("it is piped");
+        let says = BufReader::new(child.stdout.take().expect("it is piped")).lines();
+        let mut hal = Self { told, says, child };
+        hal.tell(load).await;
+        hal
+    }
+
+    async fn tell(&mut self, line: &str) {
+        self.told.write_all(format!("{line}\n").as_bytes()).await.expect("it listens");
+    }
+
+    async fn set(&mut self, name: &str, value: &str) {
+        self.tell(&format!("setp {name} {value}")).await;
+    }
+
+    /// Until a pin holds this.
+    async fn until(&mut self, name: &str, value: &str) {
+        let told = timeout(PATIENCE, async {
+            loop {
+                self.tell(&format!("getp {name}")).await;
+                let said = self.says.next_line().await.expect("it speaks").expect("it has not ended");
+                if said.trim() == value {
+                    break;
+                }
+                sleep(Duration::from_millis(20)).await;
+            }
+        });
+        assert!(told.await.is_ok(), "{name} is never {value}");
+    }
+
+    async fn end(mut self) {
+        self.tell("unloadusr all").await;
+        drop(self.told);
+        timeout(PATIENCE, self.child.wait()).await.expect("it ends").expect("it can be waited for");
+    }
+}
