@@ -85,7 +85,8 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
     if about.is_none_or(|about| about.what == "limit") {
         why.extend(moved(connection, &facts, at)?);
     }
-    why.extend(beside(&facts, about, moment));
+    let beside = beside(&facts, about, moment, &why);
+    why.extend(beside);
     Ok(Story {
         drive: drive.to_owned(),
         about: about.map(|found| Sentence::of(Certainty::Seen, facts.in_words(found)).at(found.time_unix_ms)),
@@ -181,7 +182,7 @@ fn about(facts: &Facts, asked: Asked) -> Option<&RecordView> {
 
 /// What is heavier than what is asked for, before and after it: and not as its cause. Where nothing happened, what
 /// was next.
-fn beside(facts: &Facts, about: Option<&RecordView>, moment: i64) -> Vec<Sentence> {
+fn beside(facts: &Facts, about: Option<&RecordView>, moment: i64, told: &[Sentence]) -> Vec<Sentence> {
     let known = about.and_then(weight);
     let is_told = |weight: usize, begins: i64| match known {
         Some(known) => weight < known.min(HEAVY) && (begins - moment).abs() <= BESIDE_MS,
@@ -190,7 +191,10 @@ fn beside(facts: &Facts, about: Option<&RecordView>, moment: i64) -> Vec<Sentenc
     let number = about.map_or(0, |about| about.number);
     let others = || {
         told_of(facts).filter(|(weight, begins, found)| {
-            found.number != number && found.time_unix_ms != moment && is_told(*weight, *begins)
+            found.number != number
+                && found.time_unix_ms != moment
+                && is_told(*weight, *begins)
+                && !told.iter().any(|one| one.time_unix_ms == Some(found.time_unix_ms))
         })
     };
     let before = others().filter(|(_, begins, _)| *begins < moment).max_by_key(|(_, begins, _)| *begins);

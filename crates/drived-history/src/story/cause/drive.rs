@@ -23,14 +23,15 @@ pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, op
     }
     all.extend(seen_beside(facts, about.time_unix_ms));
     if about.what == "output_blocked" {
-        all.extend(of_block(facts, about));
+        all.extend(of_low_speed(facts, about));
     }
     all.push(Sentence::of(NotKnown, open));
     all
 }
 
-/// What speaks for one of several things that may block an output: inputs that stayed as they were, and a setpoint before it.
-fn of_block(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
+/// What speaks for a time at low speed, where the drive names it among what may have stopped it: a setpoint before it, and inputs that stayed as they
+/// were. Not every input of every drive is read, so that these alone rule nothing out.
+fn of_low_speed(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     let at = about.time_unix_ms;
     let setpoint = facts.records.iter().rev().find(|found| {
         found.kind == "command"
@@ -38,20 +39,16 @@ fn of_block(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             && facts.is_of_drive(found)
             && (at - BESIDE_MS..=at).contains(&found.time_unix_ms)
     });
-    let stayed = inputs_stayed(facts, at);
-    let may_be_slow = about.text.contains("low speed") && setpoint.is_some();
-    let mut said = Vec::new();
-    if let Some(setpoint) = setpoint {
-        let text = format!("before it somebody here had asked: {}", setpoint.text);
-        said.push(Sentence::of(Seen, text).at(setpoint.time_unix_ms));
-    }
-    if may_be_slow && stayed.is_some() {
+    let Some(setpoint) = setpoint.filter(|_| about.text.contains("low speed")) else { return Vec::new() };
+    let text = format!("before it somebody here had asked: {}", setpoint.text);
+    let mut said = vec![Sentence::of(Seen, text).at(setpoint.time_unix_ms)];
+    if let Some(stayed) = inputs_stayed(facts, at) {
+        said.push(stayed);
         said.push(Sentence::of(
             Likely,
-            "its time at low speed was over, behind that setpoint: no input changed, and a key is the other way",
+            "its time at low speed was over, behind that setpoint: no input that is read changed, and a key is the other way",
         ));
     }
-    said.extend(stayed);
     said
 }
 

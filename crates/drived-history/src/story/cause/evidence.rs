@@ -121,7 +121,9 @@ pub(super) fn inputs_stayed(facts: &Facts, at: i64) -> Option<Sentence> {
     let (_, count) = facts.inputs.iter().rev().find(|(since, _)| *since <= at)?;
     let is_known = facts.inputs_known.iter().any(|(start, end)| *start <= at && *end > at);
     (is_known && inputs_changed(facts, at).is_none()).then(|| {
-        let text = format!("its inputs were read as the same before it and after it ({count:04X}h): none did it that has stayed as it is since");
+        let text = format!(
+            "its inputs, as far as they are read, were the same before it and after it ({count:04X}h)"
+        );
         Sentence::of(Seen, text)
     })
 }

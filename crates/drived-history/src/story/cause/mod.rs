@@ -88,7 +88,8 @@ pub(super) fn of_nothing(facts: &Facts, at: i64) -> Vec<Sentence> {
         }
         None => vec![Sentence::of(Seen, "nothing happened to it then that is recorded").at(at)],
     };
-    said.extend(program(facts, at));
+    // What ended a time in which nothing is known may be told with it.
+    said.extend(program(facts, facts.gap_at(at).map_or(at, |(_, end)| end)));
     said
 }
 
