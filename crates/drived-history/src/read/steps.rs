@@ -155,11 +155,8 @@ fn add_minutes(
     })?;
     for row in rows {
         let (start, data) = row?;
-        for (at, step) in unpack_steps(MINUTE_MS, start, &data)? {
-            if (from..=to).contains(&at) {
-                steps.add_step(at, step);
-            }
-        }
+        let minutes = unpack_steps(MINUTE_MS, start, &data)?;
+        steps.add_steps(minutes.into_iter().filter(|(at, _)| (from..=to).contains(at)));
     }
     Ok(())
 }

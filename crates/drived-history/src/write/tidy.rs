@@ -8,7 +8,7 @@ use super::{
     changes,
 };
 use crate::{
-    chunk::Chunk,
+    chunk::{Chunk, Packed},
     column::pack,
     curve::{Piece, Step, Steps, joined},
     quantity::{Quantity, TABLE},
@@ -18,12 +18,14 @@ use crate::{
 
 const MINUTE_MS: i64 = 60_000;
 const HOUR_MS: i64 = 3_600_000;
+/// Of so many sources blocks are made in one transaction: each waits for the disk.
+const SOURCES_AT_ONCE: usize = 16;
 /// So many rows go at once, so that nothing else waits for long.
 const AT_ONCE: i64 = 500;
 /// Likewise where the file is too large: no more goes than has to.
 const FEW: i64 = 20;
 
-/// Makes blocks of one source of the oldest hour that is over; gives whether there may be more.
+/// Makes blocks of a few sources of the oldest hour that is over; gives whether there may be more.
 ///
 /// # Errors
 /// It cannot be read or written.
@@ -33,14 +35,16 @@ pub fn compact(connection: &mut Connection, now_ms: i64) -> Result<bool, StoreEr
     let last = hour.flushes.last().copied().unwrap_or_default();
     let within = [first << SOURCE_BITS, (last + 1) << SOURCE_BITS];
     let transaction = connection.transaction()?;
-    let next: Option<i64> = transaction
-        .query_row("SELECT id FROM chunk WHERE id >= ?1 AND id < ?2 LIMIT 1", within, |row| row.get(0))
-        .optional()?;
-    match next {
-        Some(chunk) => hour.compact(&transaction, chunk & ((1 << SOURCE_BITS) - 1))?,
-        None => {
+    for _ in 0..SOURCES_AT_ONCE {
+        let next: Option<i64> = transaction
+            .prepare_cached("SELECT id FROM chunk WHERE id >= ?1 AND id < ?2 LIMIT 1")?
+            .query_row(within, |row| row.get(0))
+            .optional()?;
+        let Some(chunk) = next else {
             transaction.execute("DELETE FROM flush WHERE id BETWEEN ?1 AND ?2", [first, last])?;
-        }
+            break;
+        };
+        hour.compact(&transaction, chunk & ((1 << SOURCE_BITS) - 1))?;
     }
     transaction.commit()?;
     Ok(true)
@@ -75,14 +79,17 @@ impl Hour {
         let mut chunks = Vec::new();
         {
             let mut find =
-                transaction.prepare_cached("SELECT start_ms, end_ms, data FROM chunk WHERE id = ?1")?;
+                transaction.prepare_cached("SELECT start_ms, end_ms, form, data FROM chunk WHERE id = ?1")?;
             let mut delete = transaction.prepare_cached("DELETE FROM chunk WHERE id = ?1")?;
             for flush in &self.flushes {
                 let id = (flush << SOURCE_BITS) | source;
-                let chunk: Option<(i64, i64, Vec<u8>)> =
-                    find.query_row([id], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).optional()?;
-                if let Some((start, end, data)) = chunk {
-                    chunks.push(Chunk::unpacked(start, end, &data)?);
+                let chunk: Option<(i64, i64, Packed)> = find
+                    .query_row([id], |row| {
+                        Ok((row.get(0)?, row.get(1)?, Packed::of(row.get(2)?, row.get(3)?)))
+                    })
+                    .optional()?;
+                if let Some((start, end, packed)) = chunk {
+                    chunks.push(Chunk::unpacked(start, end, &packed)?);
                     delete.execute([id])?;
                 }
             }
