@@ -95,17 +95,65 @@ pub fn pack_numbers(numbers: &[i64]) -> Vec<u8> {
     deflated(&raw)
 }
 
-/// Numbers that were packed.
-///
-/// # Errors
-/// [`Damaged`]: there are none.
-pub fn unpack_numbers(packed: &[u8]) -> Result<Vec<i64>, Damaged> {
-    let raw = inflated(packed)?;
-    let (mut rest, mut numbers) = (&raw[..], Vec::new());
-    while !rest.is_empty() {
-        numbers.push(unzigzag(read_number(&mut rest)?));
+/// Numbers that were packed, as rows: those of the first column stand before those of the second, and so on.
+#[derive(Debug)]
+pub(crate) struct Rows<const N: usize> {
+    raw: Vec<u8>,
+    /// Where each column is read on.
+    places: [usize; N],
+    left: usize,
+}
+
+impl<const N: usize> Rows<N> {
+    /// # Errors
+    /// [`Damaged`]: there are none.
+    pub(crate) fn unpacked(packed: &[u8]) -> Result<Self, Damaged> {
+        let raw = inflated(packed)?;
+        let numbers = raw.iter().filter(|byte| **byte & 0x80 == 0).count();
+        let left = numbers / N;
+        let (mut places, mut column, mut number, mut length) = ([0; N], 0, 0, 0);
+        for (place, byte) in raw.iter().enumerate() {
+            if length == 0 && number == column * left && column < N {
+                places[column] = place;
+                column += 1;
+            }
+            length += 1;
+            if length > 10 {
+                return Err(Damaged);
+            }
+            if byte & 0x80 == 0 {
+                (number, length) = (number + 1, 0);
+            }
+        }
+        if length > 0 { Err(Damaged) } else { Ok(Self { raw, places, left }) }
     }
-    Ok(numbers)
+}
+
+impl<const N: usize> Iterator for Rows<N> {
+    type Item = [i64; N];
+
+    fn next(&mut self) -> Option<[i64; N]> {
+        self.left = self.left.checked_sub(1)?;
+        let mut row = [0; N];
+        for (number, place) in row.iter_mut().zip(&mut self.places) {
+            let (mut read, mut shift) = (0_u64, 0);
+            loop {
+                let byte = *self.raw.get(*place)?;
+                *place += 1;
+                read |= u64::from(byte & 0x7F).wrapping_shl(shift);
+                shift += 7;
+                if byte & 0x80 == 0 {
+                    break;
+                }
+            }
+            *number = unzigzag(read);
+        }
+        Some(row)
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        (self.left, Some(self.left))
+    }
 }
 
 /// Writes a number in LEB128.
@@ -199,10 +247,18 @@ mod tests {
         }
 
         #[test]
+        fn numbers_that_were_packed_come_back_in_rows(columns in prop::collection::vec(any::<[i64; 3]>(), 0..200)) {
+            let column = |place: usize| columns.iter().map(move |row| row[place]);
+            let numbers: Vec<i64> = column(0).chain(column(1)).chain(column(2)).collect();
+            let rows: Vec<[i64; 3]> = Rows::unpacked(&pack_numbers(&numbers)).unwrap().collect();
+            prop_assert_eq!(rows, columns);
+        }
+
+        #[test]
         fn no_bytes_upset_it(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
             let _ = unpack(0, &bytes);
             let _ = unpack(0, &deflated(&bytes));
-            let _ = unpack_numbers(&deflated(&bytes));
+            let _ = Rows::<5>::unpacked(&deflated(&bytes)).map(Iterator::count);
         }
     }
 

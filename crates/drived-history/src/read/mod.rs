@@ -21,7 +21,7 @@ pub use self::{
     lines::{line_minutes, lines_at},
     parameters::parameters,
     records::{Filter, Found, records},
-    steps::{pack_steps, steps},
+    steps::{DAY_MS, pack_steps, steps, unpack_steps},
     then::then,
 };
 use crate::{

@@ -12,7 +12,7 @@ use crate::{
     column::pack,
     curve::{Piece, Step, Steps, joined},
     quantity::{Quantity, TABLE},
-    read::{SOURCE_BITS, pack_steps},
+    read::{DAY_MS, SOURCE_BITS, pack_steps, unpack_steps},
     store::StoreError,
 };
 
@@ -142,12 +142,10 @@ impl Hour {
         minutes.add(piece.clone());
         hours.add(piece);
         let minutes: Vec<(i64, Step)> = minutes.all.into_iter().collect();
-        if let Some((start, _)) = minutes.first() {
-            transaction
-                .prepare_cached(
-                    "INSERT INTO minute (source, quantity, start_ms, data) VALUES (?1, ?2, ?3, ?4)",
-                )?
-                .execute(params![source, quantity.0, start, pack_steps(MINUTE_MS, *start, &minutes)])?;
+        for of_day in
+            minutes.chunk_by(|(one, _), (other, _)| one.div_euclid(DAY_MS) == other.div_euclid(DAY_MS))
+        {
+            keep_minutes(transaction, source, quantity, of_day)?;
         }
         for (start, step) in hours.all {
             transaction
@@ -172,6 +170,39 @@ impl Hour {
         }
         Ok(())
     }
+}
+
+/// Keeps minutes of one day, in one pack with those of the day before them: of a quarter of a year it is read in a few large parts.
+fn keep_minutes(
+    transaction: &Transaction<'_>,
+    source: i64,
+    quantity: Quantity,
+    minutes: &[(i64, Step)],
+) -> Result<(), StoreError> {
+    let Some((first, _)) = minutes.first() else { return Ok(()) };
+    let day = first - first.rem_euclid(DAY_MS);
+    let before: Option<(i64, i64, Vec<u8>)> = transaction
+        .prepare_cached(
+            "SELECT id, start_ms, data FROM minute WHERE source = ?1 AND quantity = ?2 AND start_ms BETWEEN ?3 AND ?4
+             ORDER BY start_ms DESC LIMIT 1",
+        )?
+        .query_row(params![source, quantity.0, day, first], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
+        .optional()?;
+    if let Some((id, start, data)) = before {
+        let mut all: Vec<(i64, Step)> = unpack_steps(MINUTE_MS, start, &data)?.collect();
+        // Where the clock was set back they stand beside it.
+        if all.last().is_none_or(|(last, _)| last <= first) {
+            all.extend_from_slice(minutes);
+            transaction
+                .prepare_cached("UPDATE minute SET data = ?2 WHERE id = ?1")?
+                .execute(params![id, pack_steps(MINUTE_MS, start, &all)])?;
+            return Ok(());
+        }
+    }
+    transaction
+        .prepare_cached("INSERT INTO minute (source, quantity, start_ms, data) VALUES (?1, ?2, ?3, ?4)")?
+        .execute(params![source, quantity.0, first, pack_steps(MINUTE_MS, *first, minutes)])?;
+    Ok(())
 }
 
 /// Parts of a piece that are no longer than a block may be.
@@ -209,7 +240,8 @@ pub fn trim(connection: &mut Connection, now: Lived, limits: &Limits) -> Result<
     if let Some(then) = age::newest_then(connection, now, limits.polled_ms)? {
         gone += trim_table(connection, "block", then.block)?;
     }
-    if let Some(then) = age::newest_then(connection, now, limits.minutes_ms)? {
+    // A pack is as old as its first minute.
+    if let Some(then) = age::newest_then(connection, now, limits.minutes_ms + DAY_MS)? {
         gone += trim_table(connection, "minute", then.minute)?;
     }
     if let Some(then) = age::newest_then(connection, now, limits.years_ms)? {
