@@ -3,11 +3,14 @@
 use std::collections::BTreeMap;
 
 use crate::{
-    column::{Damaged, Point, pack, read_number, unpack, write_number},
+    column::{self, Damaged, Point, deflated, inflated, read_number, unpack, write_number},
     curve::Piece,
     quantity::Quantity,
     tracker::Seen,
 };
+
+/// The number in the file of the form in which a chunk is written: one stream.
+pub(crate) const WHOLE: i64 = 2;
 
 /// What is known of one set of one drive between two moments of one clock.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -60,30 +63,86 @@ impl Chunk {
         Self { start: self.end, end: self.end, columns: columns.collect(), is_new: false }
     }
 
-    /// As bytes: for each quantity its number, how many bytes its column has, and the column, whose times count from the start.
+    /// As bytes, in one zlib stream: for each quantity its number, how many bytes its column has, and the column, whose times count from the
+    /// start. A column alone is too short to be packed.
     #[must_use]
     pub(crate) fn packed(&self) -> Vec<u8> {
-        let mut bytes = Vec::new();
+        let (mut bytes, mut column) = (Vec::new(), Vec::new());
         for (quantity, points) in &self.columns {
-            let column = pack(self.start, points);
+            column.clear();
+            column::write(self.start, points, &mut column);
             write_number(&mut bytes, u64::from(quantity.0));
             write_number(&mut bytes, column.len() as u64);
-            bytes.extend(column);
+            bytes.extend_from_slice(&column);
         }
-        bytes
+        deflated(&bytes)
     }
 
     /// Reads what was packed.
     ///
     /// # Errors
     /// [`Damaged`]: it is none.
-    pub(crate) fn unpacked(start: i64, end: i64, mut bytes: &[u8]) -> Result<Self, Damaged> {
+    pub(crate) fn unpacked(start: i64, end: i64, packed: &Packed) -> Result<Self, Damaged> {
         let mut columns = BTreeMap::new();
-        each_column(&mut bytes, |quantity, column| {
-            columns.insert(quantity, unpack(start, column)?);
+        packed.each_column(|quantity, column| {
+            columns.insert(quantity, column.points(start)?);
             Ok(())
         })?;
         Ok(Self { start, end, columns, is_new: false })
+    }
+}
+
+/// The bytes of a chunk as they stand in the file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Packed {
+    /// In one stream.
+    Whole(Vec<u8>),
+    /// Each column in a stream of its own, as files of versions before the third have it.
+    Columns(Vec<u8>),
+}
+
+/// One column of it.
+enum Column<'a> {
+    Plain(&'a [u8]),
+    Packed(&'a [u8]),
+}
+
+impl Column<'_> {
+    fn points(&self, start: i64) -> Result<Vec<Point>, Damaged> {
+        match self {
+            Self::Plain(bytes) => column::read(start, bytes),
+            Self::Packed(bytes) => unpack(start, bytes),
+        }
+    }
+}
+
+impl Packed {
+    /// Of a form, by its number in the file.
+    pub(crate) fn of(form: i64, data: Vec<u8>) -> Self {
+        if form == WHOLE { Self::Whole(data) } else { Self::Columns(data) }
+    }
+
+    fn each_column(
+        &self,
+        mut each: impl FnMut(Quantity, Column<'_>) -> Result<(), Damaged>,
+    ) -> Result<(), Damaged> {
+        let whole;
+        let (mut bytes, is_whole): (&[u8], bool) = match self {
+            Self::Whole(data) => {
+                whole = inflated(data)?;
+                (&whole, true)
+            }
+            Self::Columns(data) => (data, false),
+        };
+        while !bytes.is_empty() {
+            let quantity = u32::try_from(read_number(&mut bytes)?).map_err(|_| Damaged)?;
+            let length = usize::try_from(read_number(&mut bytes)?).map_err(|_| Damaged)?;
+            let (column, rest) = bytes.split_at_checked(length).ok_or(Damaged)?;
+            bytes = rest;
+            let column = if is_whole { Column::Plain(column) } else { Column::Packed(column) };
+            each(Quantity(quantity), column)?;
+        }
+        Ok(())
     }
 }
 
@@ -91,29 +150,15 @@ impl Chunk {
 ///
 /// # Errors
 /// [`Damaged`]: they are none.
-pub(crate) fn piece_of(quantity: Quantity, start: i64, end: i64, mut bytes: &[u8]) -> Result<Piece, Damaged> {
+pub(crate) fn piece_of(quantity: Quantity, start: i64, end: i64, packed: &Packed) -> Result<Piece, Damaged> {
     let mut piece = Piece { start, end, points: Vec::new() };
-    each_column(&mut bytes, |found, column| {
+    packed.each_column(|found, column| {
         if found == quantity {
-            piece.points = unpack(start, column)?;
+            piece.points = column.points(start)?;
         }
         Ok(())
     })?;
     Ok(piece)
-}
-
-fn each_column(
-    bytes: &mut &[u8],
-    mut each: impl FnMut(Quantity, &[u8]) -> Result<(), Damaged>,
-) -> Result<(), Damaged> {
-    while !bytes.is_empty() {
-        let quantity = u32::try_from(read_number(bytes)?).map_err(|_| Damaged)?;
-        let length = usize::try_from(read_number(bytes)?).map_err(|_| Damaged)?;
-        let (column, rest) = bytes.split_at_checked(length).ok_or(Damaged)?;
-        *bytes = rest;
-        each(Quantity(quantity), column)?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -137,7 +182,19 @@ mod tests {
         chunk.see(&seen(9_000, true, 50));
         let counts: Vec<_> = chunk.columns[&HZ].iter().map(|point| (point.at, point.count)).collect();
         assert_eq!(counts, [(1_000, Some(50)), (2_001, None), (9_000, Some(50))]);
-        let read = Chunk::unpacked(chunk.start, chunk.end, &chunk.packed()).unwrap();
+        let read = Chunk::unpacked(chunk.start, chunk.end, &Packed::of(WHOLE, chunk.packed())).unwrap();
         assert_eq!(read.columns, chunk.columns);
+    }
+
+    #[test]
+    fn a_chunk_of_an_older_file_is_read_as_it_was_written_then() {
+        let points = vec![Point { at: 1_000, count: Some(50) }, Point { at: 2_000, count: Some(48) }];
+        let column = column::pack(1_000, &points);
+        let mut old = Vec::new();
+        write_number(&mut old, u64::from(HZ.0));
+        write_number(&mut old, column.len() as u64);
+        old.extend(column);
+        let read = Chunk::unpacked(1_000, 2_000, &Packed::of(1, old)).unwrap();
+        assert_eq!(read.columns[&HZ], points);
     }
 }

@@ -4,12 +4,20 @@
 //! the next time differs from the step before, and by how much the count differs from the one before. A count that is not known is
 //! written as the marker 0, any other as its difference zigzag and 1 more.
 
-use std::io::{Read as _, Write as _};
+use std::cell::RefCell;
 
-use flate2::{Compression, read::ZlibDecoder, write::ZlibEncoder};
+use flate2::{Compress, Compression, Decompress, FlushCompress, FlushDecompress, Status};
 
 /// More bytes than this are none that were written here: a column holds an hour of one quantity.
-const LONGEST: u64 = 64 << 20;
+const LONGEST: usize = 64 << 20;
+/// So much room there is at the least for what was packed.
+const ROOM: usize = 4_096;
+
+thread_local! {
+    /// One state for each thread that packs: to make one takes longer than to pack what a column holds.
+    static PACKS: RefCell<Compress> = RefCell::new(Compress::new(Compression::default(), true));
+    static UNPACKS: RefCell<Decompress> = RefCell::new(Decompress::new(true));
+}
 
 /// What was known of a quantity from one moment on: a count in the quantity's own steps; `None`: nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,20 +36,25 @@ pub struct Damaged;
 #[must_use]
 pub fn pack(start: i64, points: &[Point]) -> Vec<u8> {
     let mut raw = Vec::with_capacity(points.len() * 3);
+    write(start, points, &mut raw);
+    deflated(&raw)
+}
+
+/// Writes points as pairs of numbers, with their times from `start`.
+pub(crate) fn write(start: i64, points: &[Point], raw: &mut Vec<u8>) {
     let (mut at, mut step, mut count) = (start, 0_i64, 0_i64);
     for point in points {
         let next = point.at.wrapping_sub(at);
-        write_number(&mut raw, zigzag(next.wrapping_sub(step)));
+        write_number(raw, zigzag(next.wrapping_sub(step)));
         (at, step) = (point.at, next);
         match point.count {
-            None => write_number(&mut raw, 0),
+            None => write_number(raw, 0),
             Some(known) => {
-                write_number(&mut raw, zigzag(known.wrapping_sub(count)).saturating_add(1));
+                write_number(raw, zigzag(known.wrapping_sub(count)).saturating_add(1));
                 count = known;
             }
         }
     }
-    deflated(&raw)
 }
 
 /// Unpacks what was packed from `start`.
@@ -49,8 +62,15 @@ pub fn pack(start: i64, points: &[Point]) -> Vec<u8> {
 /// # Errors
 /// [`Damaged`]: it is no column.
 pub fn unpack(start: i64, packed: &[u8]) -> Result<Vec<Point>, Damaged> {
-    let raw = inflated(packed)?;
-    let (mut rest, mut points) = (&raw[..], Vec::new());
+    read(start, &inflated(packed)?)
+}
+
+/// Reads points that were written from `start`.
+///
+/// # Errors
+/// [`Damaged`]: there are none.
+pub(crate) fn read(start: i64, mut rest: &[u8]) -> Result<Vec<Point>, Damaged> {
+    let mut points = Vec::with_capacity(rest.len() / 2);
     let (mut at, mut step, mut count) = (start, 0_i64, 0_i64);
     while !rest.is_empty() {
         step = step.wrapping_add(unzigzag(read_number(&mut rest)?));
@@ -75,17 +95,65 @@ pub fn pack_numbers(numbers: &[i64]) -> Vec<u8> {
     deflated(&raw)
 }
 
-/// Numbers that were packed.
-///
-/// # Errors
-/// [`Damaged`]: there are none.
-pub fn unpack_numbers(packed: &[u8]) -> Result<Vec<i64>, Damaged> {
-    let raw = inflated(packed)?;
-    let (mut rest, mut numbers) = (&raw[..], Vec::new());
-    while !rest.is_empty() {
-        numbers.push(unzigzag(read_number(&mut rest)?));
+/// Numbers that were packed, as rows: those of the first column stand before those of the second, and so on.
+#[derive(Debug)]
+pub(crate) struct Rows<const N: usize> {
+    raw: Vec<u8>,
+    /// Where each column is read on.
+    places: [usize; N],
+    left: usize,
+}
+
+impl<const N: usize> Rows<N> {
+    /// # Errors
+    /// [`Damaged`]: there are none.
+    pub(crate) fn unpacked(packed: &[u8]) -> Result<Self, Damaged> {
+        let raw = inflated(packed)?;
+        let numbers = raw.iter().filter(|byte| **byte & 0x80 == 0).count();
+        let left = numbers / N;
+        let (mut places, mut column, mut number, mut length) = ([0; N], 0, 0, 0);
+        for (place, byte) in raw.iter().enumerate() {
+            if length == 0 && number == column * left && column < N {
+                places[column] = place;
+                column += 1;
+            }
+            length += 1;
+            if length > 10 {
+                return Err(Damaged);
+            }
+            if byte & 0x80 == 0 {
+                (number, length) = (number + 1, 0);
+            }
+        }
+        if length > 0 { Err(Damaged) } else { Ok(Self { raw, places, left }) }
     }
-    Ok(numbers)
+}
+
+impl<const N: usize> Iterator for Rows<N> {
+    type Item = [i64; N];
+
+    fn next(&mut self) -> Option<[i64; N]> {
+        self.left = self.left.checked_sub(1)?;
+        let mut row = [0; N];
+        for (number, place) in row.iter_mut().zip(&mut self.places) {
+            let (mut read, mut shift) = (0_u64, 0);
+            loop {
+                let byte = *self.raw.get(*place)?;
+                *place += 1;
+                read |= u64::from(byte & 0x7F).wrapping_shl(shift);
+                shift += 7;
+                if byte & 0x80 == 0 {
+                    break;
+                }
+            }
+            *number = unzigzag(read);
+        }
+        Some(row)
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        (self.left, Some(self.left))
+    }
 }
 
 /// Writes a number in LEB128.
@@ -128,10 +196,18 @@ const fn unzigzag(number: u64) -> i64 {
 /// Bytes as a zlib stream.
 #[must_use]
 pub fn deflated(raw: &[u8]) -> Vec<u8> {
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    // Into memory: it does not fail.
-    let _ = encoder.write_all(raw);
-    encoder.finish().unwrap_or_default()
+    PACKS.with_borrow_mut(|packs| {
+        packs.reset();
+        let mut packed = Vec::with_capacity(raw.len() + 64);
+        loop {
+            let done = usize::try_from(packs.total_in()).unwrap_or(raw.len());
+            // Into memory: it does not fail.
+            match packs.compress_vec(&raw[done..], &mut packed, FlushCompress::Finish) {
+                Ok(Status::StreamEnd) | Err(_) => return packed,
+                Ok(_) => packed.reserve(raw.len() / 8 + 64),
+            }
+        }
+    })
 }
 
 /// The bytes of a zlib stream.
@@ -139,9 +215,19 @@ pub fn deflated(raw: &[u8]) -> Vec<u8> {
 /// # Errors
 /// [`Damaged`]: it is none.
 pub fn inflated(packed: &[u8]) -> Result<Vec<u8>, Damaged> {
-    let mut raw = Vec::new();
-    ZlibDecoder::new(packed).take(LONGEST).read_to_end(&mut raw).map_err(|_| Damaged)?;
-    Ok(raw)
+    UNPACKS.with_borrow_mut(|unpacks| {
+        let mut room = ROOM.max(packed.len() * 8);
+        loop {
+            unpacks.reset(true);
+            let mut raw = Vec::with_capacity(room);
+            match unpacks.decompress_vec(packed, &mut raw, FlushDecompress::Finish) {
+                Ok(Status::StreamEnd) => return Ok(raw),
+                // It wants more room, and gets it once more from the beginning.
+                Ok(_) if raw.len() == raw.capacity() && room < LONGEST => room *= 8,
+                _ => return Err(Damaged),
+            }
+        }
+    })
 }
 
 #[cfg(test)]
@@ -161,10 +247,18 @@ mod tests {
         }
 
         #[test]
+        fn numbers_that_were_packed_come_back_in_rows(columns in prop::collection::vec(any::<[i64; 3]>(), 0..200)) {
+            let column = |place: usize| columns.iter().map(move |row| row[place]);
+            let numbers: Vec<i64> = column(0).chain(column(1)).chain(column(2)).collect();
+            let rows: Vec<[i64; 3]> = Rows::unpacked(&pack_numbers(&numbers)).unwrap().collect();
+            prop_assert_eq!(rows, columns);
+        }
+
+        #[test]
         fn no_bytes_upset_it(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
             let _ = unpack(0, &bytes);
             let _ = unpack(0, &deflated(&bytes));
-            let _ = unpack_numbers(&deflated(&bytes));
+            let _ = Rows::<5>::unpacked(&deflated(&bytes)).map(Iterator::count);
         }
     }
 

@@ -132,6 +132,25 @@ impl Steps {
         self.all.entry(start).and_modify(|known| *known = known.with(step)).or_insert(step);
     }
 
+    /// Adds steps that follow each other: those of one step of these are summed up before they are added.
+    pub fn add_steps(&mut self, steps: impl IntoIterator<Item = (i64, Step)>) {
+        let mut open: Option<(i64, Step)> = None;
+        for (at, step) in steps {
+            match &mut open {
+                Some((start, sum)) if (*start..*start + self.length).contains(&at) => *sum = sum.with(step),
+                _ => {
+                    let next = (at - at.rem_euclid(self.length), step);
+                    if let Some((start, sum)) = open.replace(next) {
+                        self.add_step(start, sum);
+                    }
+                }
+            }
+        }
+        if let Some((start, sum)) = open {
+            self.add_step(start, sum);
+        }
+    }
+
     /// A count held from one moment to another.
     fn hold(&mut self, count: i64, from: i64, until: i64) {
         let mut at = from;

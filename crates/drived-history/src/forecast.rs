@@ -17,6 +17,8 @@ const MINUTE_BYTES: u64 = 6;
 const HOUR_BYTES: u64 = 30;
 /// Bytes of what happens to a drive in a day: ten events with what the API tells of each.
 const RECORD_BYTES: u64 = 10 * 1_200;
+/// So often the minutes of a number are written in a day: with each hour those of the day before it once more, to the log and to the file.
+const MINUTES_WRITTEN_TIMES: u64 = 24;
 /// A value is written to the log of the file, to the file, and both again in its block; a page is more than what is in it.
 const WRITTEN_TIMES: u64 = 5;
 
@@ -54,6 +56,7 @@ impl Forecast {
         let bytes = (values * BYTES) as f64 * days(limits.polled_ms)
             + numbers * (1_440 * MINUTE_BYTES) as f64 * days(limits.minutes_ms)
             + (numbers * (24 * HOUR_BYTES) as f64 + RECORD_BYTES as f64) * days(limits.years_ms);
-        Self { bytes: bytes as u64, bytes_a_day: (values * BYTES + RECORD_BYTES) * WRITTEN_TIMES }
+        let minutes = (FAST + SLOW) * 1_440 * MINUTE_BYTES * MINUTES_WRITTEN_TIMES;
+        Self { bytes: bytes as u64, bytes_a_day: (values * BYTES + RECORD_BYTES) * WRITTEN_TIMES + minutes }
     }
 }

@@ -21,11 +21,11 @@ pub use self::{
     lines::{line_minutes, lines_at},
     parameters::parameters,
     records::{Filter, Found, records},
-    steps::{pack_steps, steps},
+    steps::{DAY_MS, pack_steps, steps, unpack_steps},
     then::then,
 };
 use crate::{
-    chunk::{Chunk, piece_of},
+    chunk::{Chunk, Packed, piece_of},
     column::{Point, unpack},
     curve::{Piece, joined},
     quantity::{Quantity, Set},
@@ -346,19 +346,19 @@ fn source(connection: &Connection, drive: &str, set: Set) -> Result<Option<i64>,
 }
 
 /// A chunk as it is written: its segment, start, end, and bytes.
-type Packed = (i64, i64, i64, Vec<u8>);
+type Written = (i64, i64, i64, Packed);
 
 /// The chunks of a source between two moments.
-fn chunks(connection: &Connection, source: i64, from: i64, to: i64) -> Result<Vec<Packed>, StoreError> {
+fn chunks(connection: &Connection, source: i64, from: i64, to: i64) -> Result<Vec<Written>, StoreError> {
     // A flush begins where its oldest chunk does.
     let mut find = connection.prepare_cached(
-        "SELECT flush.segment, chunk.start_ms, chunk.end_ms, chunk.data
+        "SELECT flush.segment, chunk.start_ms, chunk.end_ms, chunk.form, chunk.data
          FROM flush JOIN chunk ON chunk.id = ((flush.id << ?1) | ?2)
          WHERE flush.end_ms >= ?3 AND flush.start_ms <= ?4 AND chunk.end_ms >= ?3 AND chunk.start_ms <= ?4
          ORDER BY flush.id",
     )?;
     let rows = find.query_map(params![SOURCE_BITS, source, from, to], |row| {
-        Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))
+        Ok((row.get(0)?, row.get(1)?, row.get(2)?, Packed::of(row.get(3)?, row.get(4)?)))
     })?;
     Ok(rows.collect::<Result<_, _>>()?)
 }

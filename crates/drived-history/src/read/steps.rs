@@ -6,7 +6,7 @@ use rusqlite::{Connection, params};
 use super::{chunks, kept, pieces, source, windows};
 use crate::{
     chunk::piece_of,
-    column::{pack_numbers, unpack_numbers},
+    column::{Rows, pack_numbers},
     curve::{Step, Steps},
     quantity::{Quantity, Set},
     store::StoreError,
@@ -14,6 +14,8 @@ use crate::{
 
 const MINUTE_MS: i64 = 60_000;
 const HOUR_MS: i64 = 3_600_000;
+/// No pack of minutes is longer.
+pub const DAY_MS: i64 = 24 * HOUR_MS;
 
 /// The steps of a quantity between two moments; a step of which nothing is known is not there. From a minute on they are summed up from
 /// what was kept in minutes, or, where that is not kept any more, in hours: those stand at the beginning of their hour. It ends when `go_on`
@@ -149,17 +151,14 @@ fn add_minutes(
     let mut find = connection.prepare_cached(
         "SELECT start_ms, data FROM minute WHERE source = ?1 AND quantity = ?2 AND start_ms BETWEEN ?3 AND ?4",
     )?;
-    let earliest = from.saturating_sub(super::LONGEST_BLOCK_MS);
+    let earliest = from.saturating_sub(DAY_MS);
     let rows = find.query_map(params![source, quantity.0, earliest, to], |row| {
         Ok((row.get::<_, i64>(0)?, row.get::<_, Vec<u8>>(1)?))
     })?;
     for row in rows {
         let (start, data) = row?;
-        for (at, step) in unpack_steps(MINUTE_MS, start, &data)? {
-            if (from..=to).contains(&at) {
-                steps.add_step(at, step);
-            }
-        }
+        let minutes = unpack_steps(MINUTE_MS, start, &data)?;
+        steps.add_steps(minutes.filter(|(at, _)| (from..=to).contains(at)));
     }
     Ok(())
 }
@@ -185,22 +184,26 @@ pub fn pack_steps(length_ms: i64, start: i64, minutes: &[(i64, Step)]) -> Vec<u8
     pack_numbers(&numbers)
 }
 
-fn unpack_steps(length_ms: i64, start: i64, data: &[u8]) -> Result<Vec<(i64, Step)>, StoreError> {
-    let numbers = unpack_numbers(data)?;
-    let count = numbers.len() / 5;
+/// The minutes, or hours, of such bytes.
+///
+/// # Errors
+/// They are none.
+pub fn unpack_steps(
+    length_ms: i64,
+    start: i64,
+    data: &[u8],
+) -> Result<impl Iterator<Item = (i64, Step)>, StoreError> {
     let (mut at, mut least) = (start, 0_i64);
-    let row = |part: usize, place: usize| numbers.get(part * count + place).copied().unwrap_or_default();
-    Ok((0..count)
-        .map(|place| {
-            at = at.wrapping_add(row(0, place).wrapping_mul(length_ms));
-            least = least.wrapping_add(row(1, place));
-            let step = Step {
-                least,
-                mean: least.wrapping_add(row(2, place)) as f64,
-                greatest: least.wrapping_add(row(3, place)),
-                known_ms: length_ms.wrapping_sub(row(4, place)),
-            };
-            (at, step)
-        })
-        .collect())
+    let rows = Rows::<5>::unpacked(data)?;
+    Ok(rows.map(move |[after, by, mean, greatest, missing]| {
+        at = at.wrapping_add(after.wrapping_mul(length_ms));
+        least = least.wrapping_add(by);
+        let step = Step {
+            least,
+            mean: least.wrapping_add(mean) as f64,
+            greatest: least.wrapping_add(greatest),
+            known_ms: length_ms.wrapping_sub(missing),
+        };
+        (at, step)
+    }))
 }

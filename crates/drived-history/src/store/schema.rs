@@ -8,7 +8,7 @@ use crate::quantity::TABLE;
 pub const APPLICATION: i32 = 0x6472_7664;
 
 /// One step for each version: the tables of the first, and what each later one changed.
-const STEPS: &[&str] = &[FIRST, SECOND];
+const STEPS: &[&str] = &[FIRST, SECOND, THIRD];
 
 pub(crate) const FIRST: &str = "
 CREATE TABLE run (
@@ -172,6 +172,11 @@ ALTER TABLE frame ADD COLUMN exchanges BLOB;
 ALTER TABLE line_minute ADD COLUMN foreigners INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE line_minute ADD COLUMN silences INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE line_minute ADD COLUMN silence_us INTEGER;
+";
+
+/// Chunks in one stream: what was written before has form 1.
+const THIRD: &str = "
+ALTER TABLE chunk ADD COLUMN form INTEGER NOT NULL DEFAULT 1;
 ";
 
 /// The version that is written here.

@@ -32,8 +32,10 @@ pub(super) struct Facts {
     pub(super) known: f64,
     /// Times in which nothing is, longer than a few polls.
     pub(super) gaps: Vec<(i64, i64)>,
-    /// What its inputs showed, from each of these moments on.
+    /// What its inputs showed, from each of these moments on,
     pub(super) inputs: Vec<(i64, i64)>,
+    /// and when anything is known of them.
+    pub(super) inputs_known: Vec<(i64, i64)>,
     /// By what it was commanded, from each of these moments on.
     pub(super) controls: Vec<(i64, String)>,
     /// When other drives of its line were heard.
@@ -74,11 +76,10 @@ impl Facts {
             gaps.push((until, to));
         }
         let known = known as f64 / (to - from).max(1) as f64;
-        let inputs = pieces(connection, drive, Quantity::INPUTS, from, to)?
-            .into_iter()
-            .flat_map(|piece| piece.points)
-            .filter_map(|point| Some((point.at, point.count?)))
-            .collect();
+        let read = pieces(connection, drive, Quantity::INPUTS, from, to)?;
+        let points = read.iter().flat_map(|piece| &piece.points);
+        let inputs = points.filter_map(|point| Some((point.at, point.count?))).collect();
+        let inputs_known = read.into_iter().flat_map(|piece| known_spans(&piece.closed())).collect();
         let foreigners = line_minutes(connection, from, to, RECORDS)?
             .into_iter()
             .filter(|minute| Some(&minute.line) == line.as_ref() && minute.foreign > 0)
@@ -100,6 +101,7 @@ impl Facts {
             known,
             gaps,
             inputs,
+            inputs_known,
             controls,
             heard: Vec::new(),
             foreigners,
@@ -139,7 +141,7 @@ impl Facts {
         if self.is_cut {
             return Some("more is recorded than was looked at".to_owned());
         }
-        let mut ended = None;
+        let (mut ended, mut last) = (None, None);
         for found in self.records.iter().filter(|found| found.kind == "history") {
             let (at, body) = (found.time_unix_ms, body(found));
             let (since, why) = match &*found.what {
@@ -159,14 +161,14 @@ impl Facts {
                 _ => continue,
             };
             if since <= to && at >= from {
-                return Some(why.to_owned());
+                last = Some(why);
             }
         }
         match ended {
             Some(ended) if ended <= to && !self.began_after(ended) => {
                 Some("this program had ended".to_owned())
             }
-            _ => None,
+            _ => last.map(str::to_owned),
         }
     }
 
@@ -191,10 +193,32 @@ impl Facts {
 
     /// What the drive said of a trip, where that was read.
     pub(super) fn explained(&self, trip: &RecordView) -> Option<&RecordView> {
-        let later = self.records.iter().filter(|found| found.number > trip.number && self.is_of_drive(found));
+        let of_same = |found: &&RecordView| found.number > trip.number && found.drive == trip.drive;
         // What is explained behind the next trip is that one.
-        let mut own = later.take_while(|found| found.what != "tripped");
+        let mut own = self.records.iter().filter(of_same).take_while(|found| found.what != "tripped");
         own.find(|found| found.what == "trip_explained").filter(|_| trip.what == "tripped")
+    }
+
+    /// Whose doing an event was. What followed an act of the program it once told as the doing of that, and such records are kept: a policy that
+    /// can do nothing of the kind, or that acted long before, did not do it.
+    pub(super) fn cause_of(&self, found: &RecordView) -> Option<Cause> {
+        let Body { cause, from, .. } = body(found);
+        let Some(Cause::Policy { policy }) = &cause else { return cause };
+        let acted = || {
+            self.records.iter().rev().any(|act| {
+                act.what == "command"
+                    && act.drive == found.drive
+                    && (found.time_unix_ms - SEEN_AGAIN_MS..=found.time_unix_ms).contains(&act.time_unix_ms)
+                    && matches!(body(act).cause, Some(Cause::Policy { policy: other }) if other == *policy)
+            })
+        };
+        let ends_run = matches!(from.as_deref(), Some("running" | "stopping" | "quick_stop"));
+        let can = match &*found.what {
+            "fault_cleared" => policy == "on_fault",
+            "state_changed" => ends_run || acted(),
+            _ => true,
+        };
+        if can { cause } else { Some(Cause::Drive) }
     }
 
     /// The drive's own record of its faults, where it was read behind a trip.
@@ -333,4 +357,12 @@ pub(super) struct Word {
 /// What the API told of it; nothing where that was not kept or is of another kind.
 pub(super) fn body(found: &RecordView) -> Body {
     found.body.as_ref().and_then(|body| serde_json::from_str(body.get()).ok()).unwrap_or_default()
+}
+
+/// A time as a person says it.
+pub(super) fn lasting(ms: i64) -> String {
+    match ms {
+        ..120_000 => format!("{:.1} s", ms as f64 / 1_000.0),
+        _ => format!("{} min", (ms + 30_000) / 60_000),
+    }
 }

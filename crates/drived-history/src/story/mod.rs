@@ -7,16 +7,16 @@ mod cause;
 mod facts;
 #[cfg(test)]
 mod tests;
+mod values;
 
 use drived_plant::plant::past::{Certainty, RecordView, SentenceView as Sentence, StoryView as Story};
 use rusqlite::Connection;
 
-use self::facts::{Facts, body};
-use crate::{
-    quantity::Quantity,
-    read::{parameters, pieces},
-    store::StoreError,
+use self::{
+    facts::{Facts, body, lasting},
+    values::{before, moved},
 };
+use crate::{read::parameters, store::StoreError};
 
 /// A moment that is a whole minute means that minute.
 const MINUTE_MS: i64 = 60_000;
@@ -77,13 +77,22 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
         Some(about) => cause::causes(&facts, about),
         None => cause::of_nothing(&facts, at),
     };
-    why.extend(beside(&facts, about, moment));
+    let settings = settings(connection, drive, moment - COURSE_BEFORE_MS, moment + COURSE_AFTER_MS)?;
+    if about.is_some_and(|about| about.what == "tripped") {
+        let written = settings.iter().filter(|setting| setting.time_unix_ms < Some(moment));
+        why.extend(written.cloned());
+    }
+    if about.is_none_or(|about| about.what == "limit") {
+        why.extend(moved(connection, &facts, at)?);
+    }
+    let beside = beside(&facts, about, moment, &why);
+    why.extend(beside);
     Ok(Story {
         drive: drive.to_owned(),
         about: about.map(|found| Sentence::of(Certainty::Seen, facts.in_words(found)).at(found.time_unix_ms)),
         why,
         before: before(connection, &facts, moment)?,
-        course: with_settings(connection, &facts, moment, course(&facts, moment))?,
+        course: with_settings(course(&facts, moment), settings),
         not_known: not_known(&facts, moment, about.is_some()),
     })
 }
@@ -173,7 +182,7 @@ fn about(facts: &Facts, asked: Asked) -> Option<&RecordView> {
 
 /// What is heavier than what is asked for, before and after it: and not as its cause. Where nothing happened, what
 /// was next.
-fn beside(facts: &Facts, about: Option<&RecordView>, moment: i64) -> Vec<Sentence> {
+fn beside(facts: &Facts, about: Option<&RecordView>, moment: i64, told: &[Sentence]) -> Vec<Sentence> {
     let known = about.and_then(weight);
     let is_told = |weight: usize, begins: i64| match known {
         Some(known) => weight < known.min(HEAVY) && (begins - moment).abs() <= BESIDE_MS,
@@ -182,7 +191,10 @@ fn beside(facts: &Facts, about: Option<&RecordView>, moment: i64) -> Vec<Sentenc
     let number = about.map_or(0, |about| about.number);
     let others = || {
         told_of(facts).filter(|(weight, begins, found)| {
-            found.number != number && found.time_unix_ms != moment && is_told(*weight, *begins)
+            found.number != number
+                && found.time_unix_ms != moment
+                && is_told(*weight, *begins)
+                && !told.iter().any(|one| one.time_unix_ms == Some(found.time_unix_ms))
         })
     };
     let before = others().filter(|(_, begins, _)| *begins < moment).max_by_key(|(_, begins, _)| *begins);
@@ -197,62 +209,6 @@ fn beside(facts: &Facts, about: Option<&RecordView>, moment: i64) -> Vec<Sentenc
             Some(Sentence::of(Certainty::Seen, text).at(found.time_unix_ms))
         })
         .collect()
-}
-
-/// A time as a person says it.
-fn lasting(ms: i64) -> String {
-    match ms {
-        ..120_000 => format!("{:.1} s", ms as f64 / 1_000.0),
-        _ => format!("{} min", (ms + 30_000) / 60_000),
-    }
-}
-
-/// How the drive was a moment before something happened.
-fn before(connection: &Connection, facts: &Facts, moment: i64) -> Result<Vec<Sentence>, StoreError> {
-    let mut said = Vec::new();
-    let shown = [
-        (Quantity::STATE, "", ""),
-        (Quantity::OUTPUT_FREQUENCY, "output ", " Hz"),
-        (Quantity::SETPOINT, "setpoint ", " Hz"),
-        (Quantity::CURRENT, "current ", " A"),
-        (Quantity::TORQUE, "torque ", " %"),
-        (Quantity::DC_BUS_VOLTAGE, "DC bus ", " V"),
-        (Quantity::MOTOR_THERMAL, "motor's thermal state ", " %"),
-    ];
-    // The status that shows what happened was read at that moment; the one before it is asked for, or the last one before it was not seen.
-    let gap = facts.gap_before(moment).map(|(start, _)| start);
-    let at = gap.unwrap_or(moment - 1_000);
-    let mut known = Vec::new();
-    for (quantity, label, unit) in shown {
-        let pieces = pieces(connection, &facts.drive, quantity, moment - 60_000, at)?;
-        let points: Vec<_> = pieces.iter().flat_map(|piece| &piece.points).collect();
-        let Some(last) = points.last() else { continue };
-        let held = pieces.last().filter(|piece| at - piece.end <= 3_000).and(last.count);
-        let Some(count) = held else { continue };
-        let text = format!("{label}{}{unit}", quantity.text(count));
-        let most = points
-            .iter()
-            .filter_map(|point| point.count)
-            .max()
-            .filter(|most| quantity.is_number() && *most > count + quantity.deadband());
-        known.push(match most {
-            Some(most) => format!("{text} ({} at the most in the minute before)", quantity.text(most)),
-            None => text,
-        });
-    }
-    match known.is_empty() {
-        true => said.push(Sentence::of(Certainty::NotKnown, "how it was a moment before is not known")),
-        false => {
-            let text = match gap {
-                Some(start) => {
-                    format!("{} (as it was read last, {} before)", known.join(", "), lasting(moment - start))
-                }
-                None => format!("{} (as the poll before showed it)", known.join(", ")),
-            };
-            said.push(Sentence::of(Certainty::Seen, text).at(at));
-        }
-    }
-    Ok(said)
 }
 
 /// What happened around a moment, in the daemon's order.
@@ -292,17 +248,13 @@ fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
     course
 }
 
-/// The same, with the settings of the drive that were read or written here as another value than before.
-fn with_settings(
-    connection: &Connection,
-    facts: &Facts,
-    moment: i64,
-    mut course: Vec<Sentence>,
-) -> Result<Vec<Sentence>, StoreError> {
-    let settings = parameters(connection, &facts.drive)?;
+/// Settings of the drive that were read or written here between two moments as another value than before.
+fn settings(connection: &Connection, drive: &str, from: i64, to: i64) -> Result<Vec<Sentence>, StoreError> {
+    let settings = parameters(connection, drive)?;
+    let mut said = Vec::new();
     for (place, setting) in settings.iter().enumerate() {
         let at = setting.first_unix_ms;
-        if !(moment - COURSE_BEFORE_MS..=moment + COURSE_AFTER_MS).contains(&at) {
+        if !(from..=to).contains(&at) {
             continue;
         }
         let before = place.checked_sub(1).map(|before| &settings[before]);
@@ -312,11 +264,19 @@ fn with_settings(
         };
         let text =
             format!("its setting {} was read, or written, as {}; {was}", setting.mnemonic, setting.text);
-        let later = |one: &Sentence| one.time_unix_ms.is_some_and(|time| time > at);
-        let place = course.iter().position(later).unwrap_or(course.len());
-        course.insert(place, Sentence::of(Certainty::Seen, text).at(at));
+        said.push(Sentence::of(Certainty::Seen, text).at(at));
     }
-    Ok(course)
+    Ok(said)
+}
+
+/// What happened, with what else was.
+fn with_settings(mut course: Vec<Sentence>, settings: Vec<Sentence>) -> Vec<Sentence> {
+    for setting in settings {
+        let later = |one: &Sentence| one.time_unix_ms > setting.time_unix_ms;
+        let place = course.iter().position(later).unwrap_or(course.len());
+        course.insert(place, setting);
+    }
+    course
 }
 
 fn sentence(facts: &Facts, found: &RecordView, with_words: bool) -> Sentence {
@@ -327,7 +287,7 @@ fn sentence(facts: &Facts, found: &RecordView, with_words: bool) -> Sentence {
         (None, None) => String::new(),
     };
     let body = body(found);
-    let by = match &body.cause {
+    let by = match facts.cause_of(found) {
         Some(facts::Cause::Command { commander, door }) => {
             let door = door.as_ref().map(|door| format!(" through {door}")).unwrap_or_default();
             format!(" (by {commander}{door})")

@@ -315,6 +315,31 @@ async fn a_folder_that_cannot_be_written_is_told_and_the_writer_goes_on_by_itsel
 }
 
 #[tokio::test]
+async fn a_disk_that_does_not_answer_is_told_once_and_nothing_is_lost_that_there_was_room_for() {
+    let folder = Folder::new("history-slow");
+    let path = folder.file("history.sqlite");
+    let (inbox, mut health, thread) = writer(path.clone());
+    becomes(&mut health, |health| *health == Health::Writing).await;
+    // As long as somebody else holds the file no write of it comes back.
+    let other = Connection::open(&path).unwrap();
+    other.execute_batch("BEGIN IMMEDIATE").unwrap();
+    for number in 1..=1_500 {
+        inbox.record(event(moment(number), "pump", "tripped"));
+    }
+    becomes(&mut health, |health| matches!(health, Health::Failing(_))).await;
+    for number in 1_501..=3_000 {
+        inbox.record(event(moment(number), "pump", "tripped"));
+    }
+    other.execute_batch("ROLLBACK").unwrap();
+    becomes(&mut health, |health| *health == Health::Writing).await;
+    inbox.end();
+    thread.join().unwrap();
+    let told = words(&History::open(&path).unwrap().0);
+    assert_eq!(told.iter().filter(|what| *what == "tripped").count(), 3_000);
+    assert!(!told.contains(&"hole".to_owned()), "{told:?}");
+}
+
+#[tokio::test]
 async fn a_file_that_is_damaged_while_it_is_written_is_put_aside_and_a_new_one_begun() {
     let folder = Folder::new("history-midway");
     let path = folder.file("history.sqlite");

@@ -13,7 +13,7 @@ use super::{
     inbox::{Batch, Lost, Shown},
 };
 use crate::{
-    chunk::Chunk,
+    chunk::{Chunk, WHOLE},
     quantity::Set,
     read::SOURCE_BITS,
     record::{LineMinute, Moment, Record, Setting},
@@ -374,11 +374,11 @@ fn write_flush(transaction: &Transaction<'_>, segment: i64, flush: &Flush) -> ru
     )?;
     let number = transaction.last_insert_rowid();
     let mut insert = transaction
-        .prepare_cached("INSERT INTO chunk (id, start_ms, end_ms, data) VALUES (?1, ?2, ?3, ?4)")?;
+        .prepare_cached("INSERT INTO chunk (id, start_ms, end_ms, data, form) VALUES (?1, ?2, ?3, ?4, ?5)")?;
     for ((drive, set), chunk) in &flush.chunks {
         let source = source(transaction, drive, *set)?;
         let id = (number << SOURCE_BITS) | source;
-        insert.execute(params![id, chunk.start + ahead, chunk.end + ahead, chunk.packed()])?;
+        insert.execute(params![id, chunk.start + ahead, chunk.end + ahead, chunk.packed(), WHOLE])?;
     }
     Ok(())
 }

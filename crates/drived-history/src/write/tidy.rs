@@ -8,22 +8,24 @@ use super::{
     changes,
 };
 use crate::{
-    chunk::Chunk,
+    chunk::{Chunk, Packed},
     column::pack,
     curve::{Piece, Step, Steps, joined},
     quantity::{Quantity, TABLE},
-    read::{SOURCE_BITS, pack_steps},
+    read::{DAY_MS, SOURCE_BITS, pack_steps, unpack_steps},
     store::StoreError,
 };
 
 const MINUTE_MS: i64 = 60_000;
 const HOUR_MS: i64 = 3_600_000;
+/// Of so many sources blocks are made in one transaction: each waits for the disk.
+const SOURCES_AT_ONCE: usize = 16;
 /// So many rows go at once, so that nothing else waits for long.
 const AT_ONCE: i64 = 500;
 /// Likewise where the file is too large: no more goes than has to.
 const FEW: i64 = 20;
 
-/// Makes blocks of one source of the oldest hour that is over; gives whether there may be more.
+/// Makes blocks of a few sources of the oldest hour that is over; gives whether there may be more.
 ///
 /// # Errors
 /// It cannot be read or written.
@@ -33,14 +35,16 @@ pub fn compact(connection: &mut Connection, now_ms: i64) -> Result<bool, StoreEr
     let last = hour.flushes.last().copied().unwrap_or_default();
     let within = [first << SOURCE_BITS, (last + 1) << SOURCE_BITS];
     let transaction = connection.transaction()?;
-    let next: Option<i64> = transaction
-        .query_row("SELECT id FROM chunk WHERE id >= ?1 AND id < ?2 LIMIT 1", within, |row| row.get(0))
-        .optional()?;
-    match next {
-        Some(chunk) => hour.compact(&transaction, chunk & ((1 << SOURCE_BITS) - 1))?,
-        None => {
+    for _ in 0..SOURCES_AT_ONCE {
+        let next: Option<i64> = transaction
+            .prepare_cached("SELECT id FROM chunk WHERE id >= ?1 AND id < ?2 LIMIT 1")?
+            .query_row(within, |row| row.get(0))
+            .optional()?;
+        let Some(chunk) = next else {
             transaction.execute("DELETE FROM flush WHERE id BETWEEN ?1 AND ?2", [first, last])?;
-        }
+            break;
+        };
+        hour.compact(&transaction, chunk & ((1 << SOURCE_BITS) - 1))?;
     }
     transaction.commit()?;
     Ok(true)
@@ -75,14 +79,17 @@ impl Hour {
         let mut chunks = Vec::new();
         {
             let mut find =
-                transaction.prepare_cached("SELECT start_ms, end_ms, data FROM chunk WHERE id = ?1")?;
+                transaction.prepare_cached("SELECT start_ms, end_ms, form, data FROM chunk WHERE id = ?1")?;
             let mut delete = transaction.prepare_cached("DELETE FROM chunk WHERE id = ?1")?;
             for flush in &self.flushes {
                 let id = (flush << SOURCE_BITS) | source;
-                let chunk: Option<(i64, i64, Vec<u8>)> =
-                    find.query_row([id], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).optional()?;
-                if let Some((start, end, data)) = chunk {
-                    chunks.push(Chunk::unpacked(start, end, &data)?);
+                let chunk: Option<(i64, i64, Packed)> = find
+                    .query_row([id], |row| {
+                        Ok((row.get(0)?, row.get(1)?, Packed::of(row.get(2)?, row.get(3)?)))
+                    })
+                    .optional()?;
+                if let Some((start, end, packed)) = chunk {
+                    chunks.push(Chunk::unpacked(start, end, &packed)?);
                     delete.execute([id])?;
                 }
             }
@@ -135,12 +142,10 @@ impl Hour {
         minutes.add(piece.clone());
         hours.add(piece);
         let minutes: Vec<(i64, Step)> = minutes.all.into_iter().collect();
-        if let Some((start, _)) = minutes.first() {
-            transaction
-                .prepare_cached(
-                    "INSERT INTO minute (source, quantity, start_ms, data) VALUES (?1, ?2, ?3, ?4)",
-                )?
-                .execute(params![source, quantity.0, start, pack_steps(MINUTE_MS, *start, &minutes)])?;
+        for of_day in
+            minutes.chunk_by(|(one, _), (other, _)| one.div_euclid(DAY_MS) == other.div_euclid(DAY_MS))
+        {
+            keep_minutes(transaction, source, quantity, of_day)?;
         }
         for (start, step) in hours.all {
             transaction
@@ -165,6 +170,39 @@ impl Hour {
         }
         Ok(())
     }
+}
+
+/// Keeps minutes of one day, in one pack with those of the day before them: of a quarter of a year it is read in a few large parts.
+fn keep_minutes(
+    transaction: &Transaction<'_>,
+    source: i64,
+    quantity: Quantity,
+    minutes: &[(i64, Step)],
+) -> Result<(), StoreError> {
+    let Some((first, _)) = minutes.first() else { return Ok(()) };
+    let day = first - first.rem_euclid(DAY_MS);
+    let before: Option<(i64, i64, Vec<u8>)> = transaction
+        .prepare_cached(
+            "SELECT id, start_ms, data FROM minute WHERE source = ?1 AND quantity = ?2 AND start_ms BETWEEN ?3 AND ?4
+             ORDER BY start_ms DESC LIMIT 1",
+        )?
+        .query_row(params![source, quantity.0, day, first], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
+        .optional()?;
+    if let Some((id, start, data)) = before {
+        let mut all: Vec<(i64, Step)> = unpack_steps(MINUTE_MS, start, &data)?.collect();
+        // Where the clock was set back they stand beside it.
+        if all.last().is_none_or(|(last, _)| last <= first) {
+            all.extend_from_slice(minutes);
+            transaction
+                .prepare_cached("UPDATE minute SET data = ?2 WHERE id = ?1")?
+                .execute(params![id, pack_steps(MINUTE_MS, start, &all)])?;
+            return Ok(());
+        }
+    }
+    transaction
+        .prepare_cached("INSERT INTO minute (source, quantity, start_ms, data) VALUES (?1, ?2, ?3, ?4)")?
+        .execute(params![source, quantity.0, first, pack_steps(MINUTE_MS, *first, minutes)])?;
+    Ok(())
 }
 
 /// Parts of a piece that are no longer than a block may be.
@@ -202,7 +240,8 @@ pub fn trim(connection: &mut Connection, now: Lived, limits: &Limits) -> Result<
     if let Some(then) = age::newest_then(connection, now, limits.polled_ms)? {
         gone += trim_table(connection, "block", then.block)?;
     }
-    if let Some(then) = age::newest_then(connection, now, limits.minutes_ms)? {
+    // A pack is as old as its first minute.
+    if let Some(then) = age::newest_then(connection, now, limits.minutes_ms + DAY_MS)? {
         gone += trim_table(connection, "minute", then.minute)?;
     }
     if let Some(then) = age::newest_then(connection, now, limits.years_ms)? {

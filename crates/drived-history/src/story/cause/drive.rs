@@ -1,0 +1,166 @@
+//! Who or what did something at a drive: somebody here, the program by its policy, or the drive and whoever else commands it.
+
+use drived_plant::plant::past::{
+    Certainty::{Likely, NotKnown, Said, Seen},
+    RecordView, SentenceView as Sentence,
+};
+
+use super::{
+    super::facts::{Cause, Facts, body},
+    evidence::{
+        BESIDE_MS, SILENT_MS, asked_before, found_within, inputs_stayed, lost_before, nobody_asked,
+        seen_beside,
+    },
+    silence::of_supply,
+};
+
+/// What somebody or something did at the drive itself.
+pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, open: &str) -> Vec<Sentence> {
+    let mut all = vec![said];
+    all.extend(lost_before(facts, about.time_unix_ms));
+    if matches!(&*about.what, "command_overridden" | "run_not_adopted") {
+        all.extend(of_supply(facts, about));
+    }
+    all.extend(seen_beside(facts, about.time_unix_ms));
+    if about.what == "output_blocked" {
+        all.extend(of_low_speed(facts, about));
+    }
+    all.push(Sentence::of(NotKnown, open));
+    all
+}
+
+/// What speaks for a time at low speed, where the drive names it among what may have stopped it: a setpoint before it, and inputs that stayed as they
+/// were. Not every input of every drive is read, so that these alone rule nothing out.
+fn of_low_speed(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
+    let at = about.time_unix_ms;
+    let setpoint = facts.records.iter().rev().find(|found| {
+        found.kind == "command"
+            && found.what == "setpoint"
+            && facts.is_of_drive(found)
+            && (at - BESIDE_MS..=at).contains(&found.time_unix_ms)
+    });
+    let Some(setpoint) = setpoint.filter(|_| about.text.contains("low speed")) else { return Vec::new() };
+    let text = format!("before it somebody here had asked: {}", setpoint.text);
+    let mut said = vec![Sentence::of(Seen, text).at(setpoint.time_unix_ms)];
+    if let Some(stayed) = inputs_stayed(facts, at) {
+        said.push(stayed);
+        said.push(Sentence::of(
+            Likely,
+            "its time at low speed was over, behind that setpoint: no input that is read changed, and a key is the other way",
+        ));
+    }
+    said
+}
+
+pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
+    match facts.cause_of(about) {
+        Some(Cause::Command { commander, door }) => {
+            let door = door.map(|door| format!(" through {door}")).unwrap_or_default();
+            let mut said = vec![Sentence::of(Seen, format!("{commander} asked for it{door}"))];
+            said.extend(
+                asked_before(facts, about, &["start", "stop", "release", "reset"])
+                    .map(|asked| Sentence::of(Seen, asked.text.clone()).at(asked.time_unix_ms)),
+            );
+            said
+        }
+        Some(Cause::Policy { policy }) => {
+            let text = format!("this program did it by itself, by its policy: {}", policy.replace('_', " "));
+            let mut said = vec![Sentence::of(Seen, text)];
+            // What the policy acted upon is what began it.
+            let upon = if policy == "on_loss" { "lost" } else { &*policy };
+            let began = facts.records.iter().rev().find(|found| {
+                found.what == upon
+                    && found.drive == about.drive
+                    && (about.time_unix_ms - BESIDE_MS..=about.time_unix_ms).contains(&found.time_unix_ms)
+            });
+            said.extend(began.map(|began| {
+                Sentence::of(Seen, format!("it acted upon this: {}", facts.in_words(began)))
+                    .at(began.time_unix_ms)
+            }));
+            said
+        }
+        Some(Cause::Found) => {
+            let at = about.time_unix_ms;
+            let mut said = vec![found_within(facts, at, "it was found so when the drive was seen again")];
+            said.extend(lost_before(facts, at));
+            said
+        }
+        Some(Cause::Drive) | None => {
+            let (mut said, at) = (Vec::new(), about.time_unix_ms);
+            let changed = body(about);
+            let begins_to_run = changed.to.as_deref() == Some("running");
+            let actions: &[&str] = match &*about.what {
+                "fault_cleared" => &["reset"],
+                _ if begins_to_run => &["start"],
+                _ => &["stop", "release"],
+            };
+            match asked_before(facts, about, actions) {
+                Some(asked) => said.push(
+                    Sentence::of(Likely, format!("a command of here came shortly before: {}", asked.text))
+                        .at(asked.time_unix_ms),
+                ),
+                None => said.push(nobody_asked(facts, about.time_unix_ms)),
+            }
+            // A drive says with the same status who commands it.
+            match facts.control_at(at + 1) {
+                Some("bus") if begins_to_run => said.push(Sentence::of(
+                    Likely,
+                    "it says that a bus commands it: another master has started it",
+                )),
+                Some(control) if control != "bus" => {
+                    said.push(Sentence::of(Said, format!("it says that it is commanded by: {control}")));
+                }
+                _ => {}
+            }
+            said.extend(seen_beside(facts, at));
+            let who = match &*about.what {
+                "fault_cleared" => {
+                    "its panel, its terminals, another master or the drive itself cleared it: which of them is not known"
+                }
+                _ if begins_to_run => {
+                    "another master, its panel, its terminals or the drive itself started it: which of them is not known for certain"
+                }
+                _ => {
+                    "its terminals, its panel, another master or the drive itself: which of them it was is not known, but for what its words show below"
+                }
+            };
+            said.push(Sentence::of(NotKnown, who));
+            said
+        }
+    }
+}
+
+pub(super) fn of_departure(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
+    let mut said = vec![Sentence::of(Seen, about.text.clone()), nobody_asked(facts, about.time_unix_ms)];
+    said.extend(seen_beside(facts, about.time_unix_ms));
+    said.push(Sentence::of(
+        NotKnown,
+        "a limit of current or torque, the mains, its settings, or somebody else's reference: which, the line does not show",
+    ));
+    said
+}
+
+pub(super) fn of_unconfirmed_stop(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
+    let mut said = Vec::new();
+    if let Some(asked) = asked_before(facts, about, &["stop"]) {
+        said.push(
+            Sentence::of(Seen, format!("the stop was asked for here: {}", asked.text)).at(asked.time_unix_ms),
+        );
+    }
+    said.push(Sentence::of(Seen, format!("the drive did not show that it had stopped: {}", about.text)));
+    let is_lost = facts.records.iter().any(|found| {
+        found.what == "lost"
+            && facts.is_of_drive(found)
+            && (found.time_unix_ms - about.time_unix_ms).abs() <= SILENT_MS
+    });
+    said.push(match is_lost {
+        true => Sentence::of(
+            NotKnown,
+            "it did not answer at that time: whether its motor turned nobody here knows",
+        ),
+        false => {
+            Sentence::of(NotKnown, "it answered, and why it did not stop its words do not say for certain")
+        }
+    });
+    said
+}

@@ -1,0 +1,177 @@
+//! What speaks for a cause: what was asked for here, what was seen beside it, and within which time it happened.
+
+use drived_plant::plant::past::{
+    Certainty::{Likely, NotKnown, Seen},
+    RecordView, SentenceView as Sentence,
+};
+
+use super::super::facts::{Facts, body, lasting};
+
+/// What comes within this time of each other may have one cause.
+pub(super) const TOGETHER_MS: i64 = 5_000;
+/// What was asked for so shortly before something was seen may have come behind it: a drive is looked at from poll to poll.
+pub(super) const ONE_POLL_MS: i64 = 5_000;
+/// A command may be the cause of what the drive does within this time.
+pub(super) const OBEYED_MS: i64 = 10_000;
+/// A silence may be the cause of a trip of the watchdog within this time.
+pub(super) const SILENT_MS: i64 = 90_000;
+/// The slow set is read so rarely that what it shows belongs to something within this time.
+pub(super) const BESIDE_MS: i64 = 60_000;
+
+/// That nobody here asked for something, where that is known: what begins between two looks at a drive was asked for shortly before.
+pub(super) fn nobody_asked(facts: &Facts, at: i64) -> Sentence {
+    match facts.missing(at - ONE_POLL_MS, at) {
+        None => Sentence::of(Seen, "nobody here asked for it"),
+        Some(why) => Sentence::of(
+            NotKnown,
+            format!("whether somebody here asked for it is not known: no command is recorded, and {why}"),
+        ),
+    }
+}
+
+/// The last command to the drive shortly before something, of these actions.
+pub(super) fn asked_before<'a>(
+    facts: &'a Facts,
+    about: &RecordView,
+    actions: &[&str],
+) -> Option<&'a RecordView> {
+    let at = about.time_unix_ms;
+    facts.records.iter().rev().find(|found| {
+        found.kind == "command"
+            && actions.contains(&&*found.what)
+            && facts.is_of_drive(found)
+            && (at - OBEYED_MS..=at).contains(&found.time_unix_ms)
+            && was_sent(facts, found)
+    })
+}
+
+/// Whether a command was, or may have been, on the wire: one that was refused moved nothing.
+fn was_sent(facts: &Facts, found: &RecordView) -> bool {
+    let outcome = facts.of_several(found).map(|one| one.outcome).or_else(|| body(found).outcome);
+    !matches!(outcome.as_deref(), Some("refused" | "expired" | "superseded" | "nothing"))
+}
+
+/// What was asked for before a trip was seen: whether it was before the trip is known only where the drive was seen between them.
+pub(super) fn in_order(facts: &Facts, about: &RecordView, asked: &RecordView) -> Sentence {
+    let between = |found: &RecordView| {
+        found.kind == "event"
+            && found.drive.as_deref() == Some(&*facts.drive)
+            && matches!(&*found.what, "state_changed" | "stop_confirmed")
+            && found.time_unix_ms > asked.time_unix_ms
+            && found.time_unix_ms < about.time_unix_ms
+    };
+    let was_seen = facts.records.iter().any(between);
+    let is_long = about.time_unix_ms - asked.time_unix_ms > ONE_POLL_MS;
+    let said = match was_seen || is_long {
+        true => Sentence::of(Seen, format!("shortly before it somebody had asked: {}", asked.text)),
+        false => Sentence::of(
+            NotKnown,
+            format!(
+                "at about the same time somebody asked, and which of the two came first is not known, for the drive is looked at from poll to poll: {}",
+                asked.text
+            ),
+        ),
+    };
+    said.at(asked.time_unix_ms)
+}
+
+/// Something that was found, and within which time it happened.
+pub(super) fn found_within(facts: &Facts, at: i64, what: &str) -> Sentence {
+    match facts.gap_before(at) {
+        Some((start, end)) => Sentence::of(
+            NotKnown,
+            format!(
+                "{what}: when that happened is not known, but that it was within the {} from this moment on, in which nothing of it is known",
+                lasting(end - start)
+            ),
+        )
+        .at(start),
+        None => Sentence::of(NotKnown, format!("{what}: when that happened is not known")),
+    }
+}
+
+/// That it had not answered until it was seen again.
+pub(super) fn lost_before(facts: &Facts, at: i64) -> Option<Sentence> {
+    let (start, end) = facts.gap_before(at)?;
+    let lost = facts.records.iter().rev().find(|found| {
+        found.what == "lost"
+            && found.drive.as_deref() == Some(&*facts.drive)
+            && (start - TOGETHER_MS..=end).contains(&found.time_unix_ms)
+    })?;
+    let text = format!("it had not answered before, for {}: {}", lasting(end - start), lost.text);
+    Some(Sentence::of(Seen, text).at(lost.time_unix_ms))
+}
+
+/// That its inputs were read otherwise behind something than before it.
+pub(super) fn inputs_changed(facts: &Facts, at: i64) -> Option<Sentence> {
+    let changed = facts
+        .inputs
+        .windows(2)
+        .find(|pair| pair[0].1 != pair[1].1 && (at - BESIDE_MS..=at + BESIDE_MS).contains(&pair[1].0))?;
+    let ((_, before), (seen, now)) = (changed[0], changed[1]);
+    let text = format!(
+        "its inputs changed from {before:04X}h to {now:04X}h, seen when they were read next ({})",
+        bits(before, now)
+    );
+    Some(Sentence::of(Seen, text).at(seen))
+}
+
+/// That they were read before it and behind it, and were the same.
+pub(super) fn inputs_stayed(facts: &Facts, at: i64) -> Option<Sentence> {
+    let (_, count) = facts.inputs.iter().rev().find(|(since, _)| *since <= at)?;
+    let is_known = facts.inputs_known.iter().any(|(start, end)| *start <= at && *end > at);
+    (is_known && inputs_changed(facts, at).is_none()).then(|| {
+        let text = format!(
+            "its inputs, as far as they are read, were the same before it and after it ({count:04X}h)"
+        );
+        Sentence::of(Seen, text)
+    })
+}
+
+/// What was seen at the drive and on its line beside something that nobody here asked for: inputs, and frames of others.
+pub(super) fn seen_beside(facts: &Facts, at: i64) -> Vec<Sentence> {
+    let mut said = Vec::new();
+    if let Some(changed) = inputs_changed(facts, at) {
+        said.push(changed);
+        let text = "an input of the drive may have done it: what each does is in the drive's settings";
+        said.push(Sentence::of(Likely, text));
+    }
+    let heard = facts.foreigners.iter().find(|(ended, _)| (at..=at + BESIDE_MS).contains(ended));
+    if let Some((ended, frames)) = heard {
+        let text = format!("its line heard {frames} frames of somebody else in the minute until then");
+        said.push(Sentence::of(Seen, text).at(*ended));
+        said.push(Sentence::of(
+            Likely,
+            "another master speaks on the line: it may have written to the drive",
+        ));
+    }
+    let finding = facts.records.iter().find(|found| {
+        found.what == "line_finding"
+            && found.line == facts.line
+            && (found.time_unix_ms - at).abs() <= 5 * BESIDE_MS
+    });
+    if let Some(finding) = finding {
+        said.push(
+            Sentence::of(Seen, format!("what was found of its line: {}", finding.text))
+                .at(finding.time_unix_ms),
+        );
+    }
+    said
+}
+
+/// Which bits changed, in words.
+fn bits(before: i64, now: i64) -> String {
+    let changed = (0..16).filter(|bit| (before ^ now) >> bit & 1 == 1);
+    let told = changed.map(|bit| format!("bit {bit} is {} now", now >> bit & 1));
+    told.collect::<Vec<_>>().join(", ")
+}
+
+pub(super) fn names(found: &[&RecordView]) -> String {
+    let mut names: Vec<&str> = found.iter().filter_map(|found| found.drive.as_deref()).collect();
+    names.sort_unstable();
+    names.dedup();
+    match names.len() {
+        0..=5 => names.join(", "),
+        more => format!("{} and {} more", names[..5].join(", "), more - 5),
+    }
+}

@@ -1,0 +1,110 @@
+//! Why something happened, as far as the facts say so. What is told, and what has to be known for it:
+//!
+//! | Told | Certainty | By what evidence |
+//! |---|---|---|
+//! | what it tripped by, who commands it, what blocks it | said | the drive's own words |
+//! | somebody here asked for it | seen | the act that the event names |
+//! | this program did it by a policy | seen | the policy that the event names, of what that policy can do |
+//! | nobody here asked for it | seen | no command within ten seconds, and nothing is missing of them |
+//! | a command of here | likely | it was sent within ten seconds before, and is of a kind that can do it |
+//! | another master | likely | the drive says that a bus commands it, or its line heard frames of somebody else |
+//! | an input | likely | the inputs were read otherwise before and after |
+//! | the time at low speed | likely | the drive names it among others, a setpoint came before, and no input changed |
+//! | its supply | likely | it was silent, and its run command was gone when it was seen again |
+//! | what a line's drives share | likely | they fell silent together, and nobody of them answered meanwhile |
+//! | what lines share | likely | drives of other lines fell silent with it |
+//! | one cause of several trips | likely | within two seconds, and by the same, or all by the supply |
+//! | that nobody here spoke to it | likely | its watchdog acted, and the program was away then |
+//! | the port of the line | seen | it could not be opened |
+//!
+//! Where a row's evidence is not there, its cause is not told, or told as what is not known.
+
+mod drive;
+mod evidence;
+mod silence;
+mod trip;
+
+use drived_plant::plant::past::{
+    Certainty::{Likely, NotKnown, Said, Seen},
+    RecordView, SentenceView as Sentence,
+};
+
+use self::{
+    drive::{at_the_drive, of_change, of_departure, of_unconfirmed_stop},
+    evidence::{SILENT_MS, TOGETHER_MS},
+    silence::of_loss,
+    trip::of_trip,
+};
+use super::facts::{Facts, lasting};
+
+/// Why this happened, the surest first. It is never empty.
+pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
+    let mut said = match &*about.what {
+        "tripped" => of_trip(facts, about),
+        "lost" => of_loss(facts, about),
+        "state_changed" | "fault_cleared" => of_change(facts, about),
+        "control_taken" => at_the_drive(
+            facts,
+            about,
+            Sentence::of(Said, format!("the drive says so: {}", about.text)),
+            "who it was cannot be seen from the line",
+        ),
+        // That the motor follows another reference than the one that was given the drive shows, and not which one does it.
+        "reference_taken" if about.text.contains("another reference") => at_the_drive(
+            facts,
+            about,
+            Sentence::of(Likely, format!("the drive's own words speak for it: {}", about.text)),
+            "a reference or a limit that was changed at the drive, or by another master: which, and who did it, cannot be seen from the line for certain",
+        ),
+        "output_blocked" | "reference_taken" | "command_overridden" | "run_not_adopted" => at_the_drive(
+            facts,
+            about,
+            Sentence::of(Said, format!("the drive's own words show it: {}", about.text)),
+            "who or what did it at the drive cannot be seen from the line",
+        ),
+        "stop_unconfirmed" => of_unconfirmed_stop(facts, about),
+        "output_departed" => of_departure(facts, about),
+        _ if about.kind == "command" => {
+            vec![Sentence::of(Seen, format!("it was asked for here: {}", about.text))]
+        }
+        _ => vec![Sentence::of(Seen, about.text.clone())],
+    };
+    said.extend(program(facts, about.time_unix_ms));
+    said
+}
+
+/// That nothing happened, or that nobody knows.
+pub(super) fn of_nothing(facts: &Facts, at: i64) -> Vec<Sentence> {
+    let mut said = match facts.gap_at(at) {
+        Some((start, end)) => vec![
+            Sentence::of(
+                NotKnown,
+                format!("whether something happened then is not known: for {} from this moment on no value of it is known", lasting(end - start)),
+            )
+            .at(start),
+        ],
+        None if at < facts.from || at > facts.to => {
+            vec![Sentence::of(NotKnown, "the history does not reach to that moment")]
+        }
+        None => vec![Sentence::of(Seen, "nothing happened to it then that is recorded").at(at)],
+    };
+    // What ended a time in which nothing is known may be told with it.
+    said.extend(program(facts, facts.gap_at(at).map_or(at, |(_, end)| end)));
+    said
+}
+
+/// What the program itself has to do with it: it was not there, or its clock was set.
+fn program(facts: &Facts, at: i64) -> Vec<Sentence> {
+    let is_near = |found: &&RecordView| {
+        found.kind == "history" && (at - SILENT_MS..=at + TOGETHER_MS).contains(&found.time_unix_ms)
+    };
+    facts
+        .records
+        .iter()
+        .filter(is_near)
+        .filter(|found| {
+            matches!(&*found.what, "began" | "began_after_kill" | "ended" | "hole" | "clock_stepped")
+        })
+        .map(|found| Sentence::of(Seen, found.text.clone()).at(found.time_unix_ms))
+        .collect()
+}

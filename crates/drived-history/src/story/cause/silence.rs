@@ -1,0 +1,171 @@
+//! Why a drive fell silent, and why it heard nothing.
+
+use drived_plant::plant::past::{
+    Certainty::{Likely, NotKnown, Seen},
+    RecordView, SentenceView as Sentence,
+};
+
+use super::{
+    super::facts::{Facts, begins},
+    evidence::{SILENT_MS, TOGETHER_MS, lost_before, names},
+};
+
+/// Drives that fell silent within this time of each other may have done so together: so much the polls and their repetitions lie apart.
+const SILENT_TOGETHER_MS: i64 = 3_000;
+
+/// Why a drive heard nothing for so long that its watchdog acted.
+pub(super) fn of_silence(facts: &Facts, at: i64) -> Vec<Sentence> {
+    let within = |found: &&RecordView| (at - SILENT_MS..=at).contains(&found.time_unix_ms);
+    let own = facts
+        .records
+        .iter()
+        .filter(within)
+        .find(|found| found.what == "lost" && found.drive.as_deref() == Some(&*facts.drive));
+    match own {
+        Some(lost) => {
+            let mut said = vec![
+                Sentence::of(Seen, format!("it had not answered before: {}", lost.text))
+                    .at(lost.time_unix_ms),
+            ];
+            said.extend(of_loss(facts, lost));
+            said
+        }
+        None => vec![match facts
+            .missing(facts.gap_before(at).map_or(i64::MIN, |(start, _)| start).max(at - SILENT_MS), at)
+            .filter(|why| why.starts_with("this program"))
+        {
+            Some(why) => Sentence::of(Likely, format!("{why}, so that nobody here spoke to it")),
+            None => Sentence::of(
+                NotKnown,
+                "why it heard no message for so long is not known: nothing of it was seen from here",
+            ),
+        }],
+    }
+}
+
+pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
+    let at = about.time_unix_ms;
+    let away = facts.records.iter().find(|found| {
+        let is_near = (found.time_unix_ms - at).abs() <= 4 * TOGETHER_MS;
+        is_near
+            && found.kind == "alarm"
+            && found.line == facts.line
+            && found.drive.is_none()
+            && matches!(&*found.what, "unacknowledged" | "acknowledged" | "shelved")
+            && body_of_alarm(found).is_some_and(|alarm| alarm.is_port_away())
+    });
+    if let Some(away) = away {
+        return vec![
+            Sentence::of(Seen, format!("the port of the line was away: {}", away.text)).at(away.time_unix_ms),
+            Sentence::of(NotKnown, "who unplugged it, or what broke, the program cannot see"),
+        ];
+    }
+    let neighbours = facts.neighbours();
+    let began = begins(about);
+    let mut lost = facts.elsewhere("lost", at, 2 * TOGETHER_MS);
+    lost.retain(|other| (begins(other) - began).abs() <= SILENT_TOGETHER_MS);
+    let answered = facts.heard_between(began, began + SILENT_TOGETHER_MS);
+    let back = facts.records.iter().filter(|found| {
+        facts.is_of_drive(found)
+            && found.number > about.number
+            && matches!(&*found.what, "command_overridden" | "run_not_adopted")
+    });
+    let is_of_this = |back: &&RecordView| {
+        facts
+            .gap_before(back.time_unix_ms)
+            .is_some_and(|(start, _)| (start - began).abs() <= SILENT_TOGETHER_MS)
+    };
+    let supply = back.filter(is_of_this).find_map(|back| of_supply(facts, back));
+    let (on_line, elsewhere): (Vec<&RecordView>, Vec<&RecordView>) =
+        lost.into_iter().partition(|found| found.line == facts.line);
+    if !elsewhere.is_empty() {
+        return vec![
+            Sentence::of(
+                Seen,
+                format!("{} fell silent with it, on other lines too", names_of([&on_line, &elsewhere])),
+            ),
+            Sentence::of(
+                Likely,
+                "what they share across the lines is the likely cause: the mains, the supply of the adapters, or this computer; which of them is not known",
+            ),
+        ];
+    }
+    if let Some(why) =
+        facts.missing(at - 2 * TOGETHER_MS, at + 2 * TOGETHER_MS).filter(|_| on_line.is_empty())
+    {
+        return vec![Sentence::of(
+            NotKnown,
+            format!("whether others fell silent with it is not known: {why}"),
+        )];
+    }
+    match on_line.len() {
+        0 => {
+            let others = match neighbours.is_empty() {
+                // A drive to which nothing happened has no record: that nobody else is there is not known.
+                true => "nothing is recorded of another drive of its line around then".to_owned(),
+                false => format!(
+                    "no other drive of its line is recorded as lost within {} s of it",
+                    SILENT_TOGETHER_MS / 1_000
+                ),
+            };
+            let mut said = vec![Sentence::of(Seen, others)];
+            said.extend(supply);
+            said.push(Sentence::of(
+                NotKnown,
+                "its supply, its branch of the cable, its address or its settings: which, the line does not show",
+            ));
+            said
+        }
+        _ => {
+            let mut said =
+                vec![Sentence::of(Seen, format!("{} of its line fell silent with it", names(&on_line)))];
+            let shared = match answered.is_empty() {
+                true => {
+                    "what they share is the likely cause: the cable, its adapter, or the supply of these drives; which of them is not known"
+                }
+                false => {
+                    "what only they share is the likely cause, such as their supply or their part of the cable; that they fell silent together may be chance"
+                }
+            };
+            if !answered.is_empty() {
+                let text = format!("{} of its line answered meanwhile", answered.join(", "));
+                said.push(Sentence::of(Seen, text));
+            }
+            said.push(Sentence::of(Likely, shared));
+            said.extend(supply);
+            said
+        }
+    }
+}
+
+/// That a drive whose run command was gone when it was seen again had lost its supply: what else takes a run command away while a drive is silent
+/// is somebody who writes to a drive that does not answer here.
+pub(super) fn of_supply(facts: &Facts, back: &RecordView) -> Option<Sentence> {
+    lost_before(facts, back.time_unix_ms)?;
+    let text = "when it was seen again its run command was gone, as it is behind a loss of supply: its supply was away";
+    Some(Sentence::of(Likely, text).at(back.time_unix_ms))
+}
+
+/// An alarm as far as it is looked at here.
+#[derive(serde::Deserialize)]
+struct Alarm {
+    kind: String,
+    #[serde(default)]
+    detail: Option<String>,
+}
+
+impl Alarm {
+    /// Whether a port was away. A line on which nothing is heard is opened anew, and told as away as long: the cable may be, and the port there.
+    fn is_port_away(&self) -> bool {
+        let is_silence = |detail: &String| detail.starts_with("nothing was heard");
+        self.kind == "line_away" && !self.detail.as_ref().is_some_and(is_silence)
+    }
+}
+
+fn body_of_alarm(found: &RecordView) -> Option<Alarm> {
+    serde_json::from_str(found.body.as_ref()?.get()).ok()
+}
+
+fn names_of<const N: usize>(found: [&Vec<&RecordView>; N]) -> String {
+    names(&found.into_iter().flatten().copied().collect::<Vec<_>>())
+}

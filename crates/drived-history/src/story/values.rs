@@ -1,0 +1,102 @@
+//! What the values of a drive show around a moment.
+
+use drived_plant::plant::past::{Certainty, SentenceView as Sentence};
+use rusqlite::Connection;
+
+use super::facts::{Facts, lasting};
+use crate::{quantity::Quantity, read::pieces, store::StoreError};
+
+/// Within this time behind a moment a value moves that belongs to it.
+const MOVES_MS: i64 = 15_000;
+
+/// How the drive was a moment before something happened.
+pub(super) fn before(
+    connection: &Connection,
+    facts: &Facts,
+    moment: i64,
+) -> Result<Vec<Sentence>, StoreError> {
+    let mut said = Vec::new();
+    let shown = [
+        (Quantity::STATE, "", ""),
+        (Quantity::OUTPUT_FREQUENCY, "output ", " Hz"),
+        (Quantity::SETPOINT, "setpoint ", " Hz"),
+        (Quantity::CURRENT, "current ", " A"),
+        (Quantity::TORQUE, "torque ", " %"),
+        (Quantity::DC_BUS_VOLTAGE, "DC bus ", " V"),
+        (Quantity::MOTOR_THERMAL, "motor's thermal state ", " %"),
+    ];
+    // The status that shows what happened was read at that moment; the one before it is asked for, or the last one before it was not seen.
+    let gap = facts.gap_before(moment).map(|(start, _)| start);
+    let at = gap.unwrap_or(moment - 1_000);
+    let mut known = Vec::new();
+    for (quantity, label, unit) in shown {
+        let pieces = pieces(connection, &facts.drive, quantity, moment - 60_000, at)?;
+        let points: Vec<_> = pieces.iter().flat_map(|piece| &piece.points).collect();
+        let Some(last) = points.last() else { continue };
+        let held = pieces.last().filter(|piece| at - piece.end <= 3_000).and(last.count);
+        let Some(count) = held else { continue };
+        let text = format!("{label}{}{unit}", quantity.text(count));
+        let most = points
+            .iter()
+            .filter_map(|point| point.count)
+            .max()
+            .filter(|most| quantity.is_number() && *most > count + quantity.deadband());
+        known.push(match most {
+            Some(most) => format!("{text} ({} at the most in the minute before)", quantity.text(most)),
+            None => text,
+        });
+    }
+    match known.is_empty() {
+        true => said.push(Sentence::of(Certainty::NotKnown, "how it was a moment before is not known")),
+        false => {
+            let text = match gap {
+                Some(start) => {
+                    format!("{} (as it was read last, {} before)", known.join(", "), lasting(moment - start))
+                }
+                None => format!("{} (as the poll before showed it)", known.join(", ")),
+            };
+            said.push(Sentence::of(Certainty::Seen, text).at(at));
+        }
+    }
+    Ok(said)
+}
+
+/// Which values moved behind a moment at which nothing is recorded: by more than a quarter, and far more than they are kept for.
+pub(super) fn moved(connection: &Connection, facts: &Facts, at: i64) -> Result<Vec<Sentence>, StoreError> {
+    let shown = [
+        (Quantity::OUTPUT_FREQUENCY, "output", "Hz"),
+        (Quantity::CURRENT, "current", "A"),
+        (Quantity::TORQUE, "torque", "%"),
+        (Quantity::DC_BUS_VOLTAGE, "DC bus", "V"),
+    ];
+    let (mut said, mut load, mut is_steady) = (Vec::new(), None, false);
+    for (quantity, label, unit) in shown {
+        let pieces = pieces(connection, &facts.drive, quantity, at - MOVES_MS, at + MOVES_MS)?;
+        let points = || pieces.iter().flat_map(|piece| &piece.points);
+        let count_then = points().take_while(|point| point.at <= at).last().and_then(|point| point.count);
+        let Some(then) = count_then else { continue };
+        let later =
+            points().skip_while(|point| point.at <= at).filter_map(|point| Some((point.at, point.count?)));
+        let farthest = later.max_by_key(|(_, count)| count.abs_diff(then));
+        let is_far = |count: i64| {
+            let by = count.abs_diff(then);
+            by > 10 * quantity.deadband().max(1).unsigned_abs()
+                && by * 4 > count.unsigned_abs().max(then.unsigned_abs())
+        };
+        let Some((seen, count)) = farthest.filter(|(_, count)| is_far(*count)) else {
+            is_steady |= quantity == Quantity::OUTPUT_FREQUENCY;
+            continue;
+        };
+        let text =
+            format!("its {label} went from {} to {} {unit}", quantity.text(then), quantity.text(count));
+        said.push(Sentence::of(Certainty::Seen, text).at(seen));
+        if matches!(quantity, Quantity::CURRENT | Quantity::TORQUE) {
+            load = Some(if count > then { "rose" } else { "fell" });
+        }
+    }
+    if let Some(way) = load.filter(|_| is_steady) {
+        let text = format!("the load of its motor {way}: current or torque moved, and the output did not");
+        said.push(Sentence::of(Certainty::Likely, text));
+    }
+    Ok(said)
+}
