@@ -434,6 +434,27 @@ mod tests {
     }
 
     #[test]
+    fn a_lost_connection_ends_nothing_that_a_gateway_is_at() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
+        far.owe(asked(3, 1, now));
+        far.lost(Some(asked(1, 2, now + 300 * MS)));
+        assert_eq!(far.owes(), 2);
+        assert_eq!(far.gate(true), Some(now + 1_250 * MS));
+    }
+
+    #[test]
+    fn a_gateway_waits_from_when_it_came_to_a_question() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
+        far.owe(asked(3, 1, now));
+        far.owe(asked(4, 2, now + 300 * MS));
+        assert_eq!(far.heard(now + SECOND, 3, Some(1), Shape::ANY, true), Some(vec![3]));
+        assert_eq!(far.heard(now + 2 * SECOND, 4, Some(2), Shape::ANY, true), Some(vec![4]));
+        assert_eq!(far.wait(), SECOND);
+    }
+
+    #[test]
     fn while_nothing_proves_that_it_is_done_it_is_asked_less_and_less() {
         let mut now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway { wait: Some(SECOND), ..Gateway::default() }));

@@ -100,7 +100,7 @@ impl Plant {
              watchdog = {{ time = \"10s\", reaction = \"ramp\" }}\n[lines.bench]\nport = \"{},19200,8E1\"\n\
              [[drives]]\nline = \"bench\"\ndrive = \"atv312@1-2\"\nname = \"pump {{}}\"\n\
              [[drives]]\nline = \"bench\"\ndrive = \"atv21@5\"\nname = \"fan\"\n\
-             [[groups]]\nname = \"pumps\"\ndrives = [\"pump 1\", \"pump 2\"]\n\
+             [groups]\npumps = [\"pump 1\", \"pump 2\"]\n\
              [[gateways]]\nlisten = \"127.0.0.1:{gateway}\"\nwrites = \"stop\"\nvirtual_unit = 247\nmax_age = \"10s\"\n\
              [history]\n",
             line.display()
