@@ -5,11 +5,14 @@
 
 #![forbid(unsafe_code)]
 
+pub mod all;
+mod child;
 pub mod differential;
 pub mod fuzz;
 pub mod matrix;
 pub mod model;
 pub mod mutation;
+pub mod program;
 pub mod report;
 pub mod sbom;
 pub mod soak;

@@ -3,7 +3,7 @@
 #![forbid(unsafe_code)]
 
 use std::{
-    io,
+    env, io,
     path::{Path, PathBuf},
     process::{self, ExitCode},
     thread,
@@ -12,19 +12,20 @@ use std::{
 
 use clap::{Parser, Subcommand};
 use drive_fire::{
-    differential, fuzz,
+    all, differential, fuzz,
     matrix::{self, story},
-    model, mutation,
+    model, mutation, program,
     report::{self, Told},
     sbom, soak,
 };
 use drive_testing::peers;
 
-/// Attacks everything that stands, and says what was tried and what was found.
+/// Attacks everything that stands, and says what was tried and what was found: by one part, or, where none is named, by all of them in
+/// turn, one round or, with --minutes, round after round until they are over.
 #[derive(Debug, Parser)]
 struct Arguments {
     #[command(subcommand)]
-    part: Part,
+    part: Option<Part>,
     /// Where the random numbers begin: the same seed, the same attack.
     #[arg(long, global = true, default_value_t = 1)]
     seed: u64,
@@ -65,6 +66,24 @@ enum Part {
         #[arg(long)]
         plants: bool,
     },
+    /// The built program from outside: its doors, and files that were changed.
+    Program {
+        /// Which; beside this one unless it is said.
+        #[arg(long)]
+        program: Option<PathBuf>,
+        /// For so many seconds each target.
+        #[arg(long, default_value_t = 20)]
+        seconds: u64,
+        /// One target alone, with `--execution`.
+        #[arg(long, requires = "execution")]
+        target: Option<String>,
+        /// One execution alone, as a find names it.
+        #[arg(long, requires = "target")]
+        execution: Option<u64>,
+        /// Whether what a wrong program would say is taken for wrong.
+        #[arg(long)]
+        plants: bool,
+    },
     /// Who accepts what: ours and somebody else.
     Differential {
         /// Who else.
@@ -85,6 +104,9 @@ enum Part {
         /// One story alone, as a find names it.
         #[arg(long)]
         story: Option<String>,
+        /// Against the planted defects of the matrix, or one of them by its name.
+        #[arg(long, num_args = 0..=1, default_missing_value = "")]
+        plants: Option<String>,
     },
     /// Mutants that a variable chooses, against the tests that own the promises they break.
     Mutants {
@@ -104,12 +126,6 @@ enum Part {
         #[arg(long, default_value_t = 31)]
         drives: u8,
     },
-    /// The lease, explored to the end, with its planted defects.
-    Lease {
-        /// Every sequence of so many steps.
-        #[arg(long, default_value_t = 5)]
-        depth: usize,
-    },
     /// The tests that could not run for want of something, when they were run last.
     Skipped,
     /// What a program is built of, as CycloneDX 1.5.
@@ -118,19 +134,20 @@ enum Part {
         #[arg(long, default_value = "drived")]
         package: String,
     },
-    /// The master of a line, explored to the end.
+    /// Small cases explored to the end: the master of a line, a gateway, the lease, identities.
     Model {
+        /// Which; all of them where none is named.
+        name: Option<String>,
         /// Every sequence of so many steps.
         #[arg(long, default_value_t = 4)]
         depth: usize,
         /// One sequence alone, as a find names it.
-        #[arg(long)]
+        #[arg(long, requires = "setting")]
         steps: Option<String>,
-        /// On which line: `Wire` or `Gateway`.
-        #[arg(long, default_value = "Wire")]
-        setting: String,
-        /// Against its planted defects, with `--features plants`.
-        #[cfg(feature = "plants")]
+        /// In which world.
+        #[arg(long, requires = "name")]
+        setting: Option<String>,
+        /// Against the planted defects; those in the line need `--features plants`.
         #[arg(long)]
         plants: bool,
     },
@@ -161,11 +178,22 @@ fn ended(result: io::Result<()>) -> ExitCode {
     ExitCode::FAILURE
 }
 
+fn found_nothing(told: &[Told]) -> ExitCode {
+    if told.iter().all(|told| told.finds.is_empty()) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
 fn main() -> ExitCode {
     let Arguments { part, seed, minutes } = Arguments::parse();
     let end = minutes.map(|minutes| Instant::now() + Duration::from_secs(60 * minutes));
     let go_on = move || end.is_none_or(|end| Instant::now() < end);
     end_what_is_stuck();
+    let Some(part) = part else {
+        let told = all::run(seed, end.is_some(), go_on, |round, told| {
+            println!("-- round {round}");
+            told.iter().for_each(|told| print!("{told}"));
+        });
+        return found_nothing(&told);
+    };
     let told: Vec<Told> = match part {
         Part::Matrix { cell: Some(name), .. } => {
             let Some(cell) = matrix::Cell::named(&name) else {
@@ -199,6 +227,24 @@ fn main() -> ExitCode {
         }
         Part::Fuzz { plants: true, .. } => vec![fuzz::find_plants(seed, 20_000)],
         Part::Fuzz { seconds, .. } => vec![fuzz::run(seed, Duration::from_secs(seconds), go_on)],
+        Part::Program { plants: true, .. } => vec![program::find_plants()],
+        Part::Program { program, seconds, target, execution, .. } => {
+            let known =
+                |name: &String| program::Target::ALL.into_iter().find(|known| format!("{known:?}") == *name);
+            let only = target.as_ref().and_then(known).zip(execution);
+            if target.is_some() && only.is_none() {
+                eprintln!("it is none of {:?}", program::Target::ALL);
+                return ExitCode::FAILURE;
+            }
+            let beside = || Ok(env::current_exe()?.with_file_name("drived"));
+            let told = program
+                .map_or_else(beside, Ok)
+                .and_then(|path| program::run(&path, seed, Duration::from_secs(seconds), only, go_on));
+            match told {
+                Ok(told) => vec![told],
+                Err(error) => return ended(Err(error)),
+            }
+        }
         Part::Differential { peer, answers, python } => match differential::run(&python, peer, seed, answers)
         {
             Ok(told) => vec![told],
@@ -216,6 +262,10 @@ fn main() -> ExitCode {
             println!("{:#?}", matrix::tell(&story, &*matrix::drive_of(story.subject)));
             return ExitCode::SUCCESS;
         }
+        Part::Worlds { plants: Some(only), stories, .. } => {
+            let only = Some(&*only).filter(|only| !only.is_empty());
+            vec![matrix::find_plants_by_stories(seed, stories as usize, only)]
+        }
         Part::Worlds { stories, .. } => vec![story::run(seed, stories, go_on)],
         Part::Mutants { hunt: Some(only) } => {
             return ended(mutation::hunt(&root(), Some(&*only).filter(|only| !only.is_empty())));
@@ -231,7 +281,6 @@ fn main() -> ExitCode {
                 go_on,
             )]
         }
-        Part::Lease { depth } => vec![model::lease::run(depth)],
         Part::Skipped => {
             let skipped = peers::skipped();
             skipped.iter().for_each(|line| println!("{line}"));
@@ -241,20 +290,26 @@ fn main() -> ExitCode {
         Part::Sbom { package } => {
             return ended(sbom::bill(&root(), &package).map(|bill| println!("{bill:#}")));
         }
-        Part::Model { steps: Some(code), setting, .. } => {
-            let known = model::master::Setting::ALL.into_iter().find(|known| format!("{known:?}") == setting);
-            let (Some(steps), Some(setting)) = (model::steps(&code), known) else {
-                eprintln!("{code} are no steps, or {setting} is no line");
-                return ExitCode::FAILURE;
+        Part::Model { name, depth, steps, setting, plants } => {
+            let named = name.map(|name| model::Model::named(&name).ok_or(name)).transpose();
+            let models = match named {
+                Ok(model) => model.map_or(model::ALL.to_vec(), |model| vec![model]),
+                Err(name) => {
+                    eprintln!("{name} is none of {:?}", model::ALL);
+                    return ExitCode::FAILURE;
+                }
             };
-            println!("{setting:?}: {steps:?}");
-            println!("{:?}", model::master::lives(setting, &steps));
-            return ExitCode::SUCCESS;
+            if let (Some(code), Some(setting), [model]) = (steps, setting, &models[..]) {
+                println!("{:?}", model.again(&setting, &code));
+                return ExitCode::SUCCESS;
+            }
+            let explore = |model| match plants {
+                true => model::find_plants(model, depth),
+                false => model::run(model, depth, go_on),
+            };
+            models.into_iter().map(explore).collect()
         }
-        #[cfg(feature = "plants")]
-        Part::Model { plants: true, depth, .. } => vec![model::find_plants(depth)],
-        Part::Model { depth, .. } => vec![model::run(depth, go_on)],
     };
     told.iter().for_each(|told| print!("{told}"));
-    if told.iter().all(|told| told.finds.is_empty()) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    found_nothing(&told)
 }

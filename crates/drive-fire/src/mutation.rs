@@ -5,17 +5,23 @@ use std::{
     collections::{BTreeMap, BTreeSet},
     env, fs, io,
     path::{Path, PathBuf},
-    process::{Command, Output, Stdio},
-    time::Instant,
+    process::{Command, Stdio},
+    time::{Duration, Instant},
 };
 
-use crate::report::{Find, Plant, Told};
+use crate::{
+    child,
+    report::{Find, Plant, Told},
+};
 
 /// The list.
 const LIST: &str = include_str!("../mutants.txt");
 
 /// The crates in which mutants stand.
 const PACKAGES: [&str; 3] = ["drive-bus", "drive-fleet", "drived-doors"];
+
+/// No test of one mutant takes so long, all tests of a library neither.
+const LONGEST: Duration = Duration::from_secs(120);
 
 /// What is known of a mutant.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -143,15 +149,21 @@ fn files(root: &Path, package: &str) -> io::Result<BTreeSet<String>> {
     Ok(names)
 }
 
-/// A test program with this mutant.
-fn test(root: &Path, row: &Row, program: &Path, arguments: &[&str]) -> io::Result<Output> {
-    Command::new(program)
-        .args(arguments)
-        .env("DRIVED_MUTANT", &row.name)
-        .env("RUST_BACKTRACE", "0")
-        .current_dir(root.join("crates").join(&row.package))
-        .stdin(Stdio::null())
-        .output()
+/// What a test program said with this mutant, and whether it failed. One that has not ended by then is ended: by a mutant that goes round
+/// for ever a test falls as well.
+fn test(root: &Path, row: &Row, program: &Path, arguments: &[&str]) -> io::Result<Ran> {
+    let mut command = Command::new(program);
+    command.args(arguments).env("DRIVED_MUTANT", &row.name).env("RUST_BACKTRACE", "0");
+    let ended = child::run(command.current_dir(root.join("crates").join(&row.package)), LONGEST)?;
+    let died = ended.status.is_none_or(|status| !status.success());
+    Ok(Ran { died, ended: ended.status.is_some(), said: ended.stdout })
+}
+
+/// What came of a test program.
+struct Ran {
+    died: bool,
+    ended: bool,
+    said: String,
 }
 
 /// Whether each mutant of the list dies by its test; those that live are tried against all tests of their crate's library.
@@ -184,8 +196,14 @@ pub fn run(root: &Path, mut go_on: impl FnMut() -> bool) -> io::Result<Told> {
             Fate::DiesBy { test, .. } => vec!["--exact", test],
             Fate::Lives(_) => Vec::new(),
         };
-        let output = test(root, &row, program, &arguments)?;
-        let (died, said) = (!output.status.success(), String::from_utf8_lossy(&output.stdout));
+        let began = Instant::now();
+        let Ran { died, ended, said } = test(root, &row, program, &arguments)?;
+        let how = match (died, ended) {
+            (true, false) => "ended, it went on for ever",
+            (true, true) => "dies",
+            (false, _) => "lives",
+        };
+        eprintln!("{:>6.1} s {}: {how}", began.elapsed().as_secs_f64(), row.name);
         let (name, replay) =
             (row.name.clone(), format!("DRIVED_MUTANT={} {} {arguments:?}", row.name, program.display()));
         match row.fate {
@@ -211,9 +229,23 @@ pub fn run(root: &Path, mut go_on: impl FnMut() -> bool) -> io::Result<Told> {
             }
         }
     }
+    for (package, breaks) in by_package(&told, &list()) {
+        told.details.push(format!("{package}: {breaks}"));
+    }
     told.details.push(format!("{lives} live, and the list says why"));
     told.took = begun.elapsed();
     Ok(told)
+}
+
+/// How many of each crate died.
+fn by_package(told: &Told, rows: &[Row]) -> Vec<(&'static str, String)> {
+    let died =
+        |row: &&Row| told.plants.iter().any(|plant| plant.name == row.name && plant.found_by.is_some());
+    let of = |package: &'static str| {
+        let of_package = rows.iter().filter(|row| row.package == package);
+        (package, format!("{} of {} die", of_package.clone().filter(died).count(), of_package.count()))
+    };
+    PACKAGES.into_iter().map(of).collect()
 }
 
 /// The tests that fell, as libtest names them.
@@ -247,8 +279,8 @@ pub fn hunt(root: &Path, only: Option<&str>) -> io::Result<()> {
             let mut fate = "lives | ?".to_owned();
             for target in &targets {
                 let Some(program) = programs.get(*target) else { continue };
-                let output = test(root, &row, program, &[])?;
-                if let Some(first) = fallen(&String::from_utf8_lossy(&output.stdout)).first() {
+                let ran = test(root, &row, program, &[])?;
+                if let Some(first) = fallen(&ran.said).first() {
                     fate = format!("{target} | {first}");
                     break;
                 }

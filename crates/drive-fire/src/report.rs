@@ -1,6 +1,7 @@
 //! What a part tells: how much it tried, what it found, which of its planted defects it found, and how long it took.
 
 use std::{
+    collections::BTreeMap,
     fmt,
     sync::{Mutex, PoisonError},
     time::{Duration, Instant},
@@ -52,6 +53,8 @@ pub struct Told {
     pub finds: Vec<Find>,
     /// What was planted.
     pub plants: Vec<Plant>,
+    /// How often what came of it.
+    pub tally: BTreeMap<String, u64>,
     /// More, line by line.
     pub details: Vec<String>,
     /// How long it took.
@@ -68,8 +71,28 @@ impl Told {
             count: 0,
             finds: Vec::new(),
             plants: Vec::new(),
+            tally: BTreeMap::new(),
             details: Vec::new(),
             took: Duration::ZERO,
+        }
+    }
+
+    /// So many more came of it.
+    pub fn count_as(&mut self, what: impl Into<String>, more: u64) {
+        *self.tally.entry(what.into()).or_default() += more;
+    }
+
+    /// The same part once more: what it tells is added. Where both name details the later ones stand.
+    pub fn add(&mut self, again: Self) {
+        self.count += again.count;
+        self.took += again.took;
+        self.finds.extend(again.finds);
+        self.plants.extend(again.plants);
+        for (what, more) in again.tally {
+            self.count_as(what, more);
+        }
+        if !again.details.is_empty() {
+            self.details = again.details;
         }
     }
 
@@ -82,8 +105,11 @@ impl Told {
 
 impl fmt::Display for Told {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { part, unit, count, finds, plants, details, took } = self;
+        let Self { part, unit, count, finds, plants, tally, details, took } = self;
         writeln!(f, "{part}: {count} {unit} in {:.1} s, {} found", took.as_secs_f64(), finds.len())?;
+        for (what, times) in tally {
+            writeln!(f, "  {times:>9} {what}")?;
+        }
         for line in details {
             writeln!(f, "  {line}")?;
         }

@@ -132,7 +132,9 @@ async fn live(
     let end = memory();
     drop(fleet.shutdown(Duration::from_secs(60)).await);
     let kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
-    told.details.extend(kept.outcomes.iter().map(|(what, count)| format!("{count:>8} {what}")));
+    for (what, count) in &kept.outcomes {
+        told.count_as(*what, *count);
+    }
     told.details.push(format!("longest stop until it was told: {:.1} s", kept.longest_stop.as_secs_f64()));
     let mut find =
         |what: String| told.finds.push(Find { what, replay: format!("drive-fire soak --seed {seed}") });

@@ -139,8 +139,12 @@ impl FarEnd {
         if crate::mutant!("far-end-owes-nothing", self.gateway.is_none(), true) || asked.slave == 0 {
             return;
         }
-        let begins = self.owed.iter().map(|owed| owed.until).max().filter(|_| self.serves < 2);
-        let limit = self.wait() * 5 / 4 * (1 << self.unproven.min(DOUBLINGS));
+        let in_turn = crate::mutant!("far-end-serves-side-by-side", self.serves < 2, false);
+        let begins = self.owed.iter().map(|owed| owed.until).max().filter(|_| in_turn);
+        let wait = crate::mutant!("far-end-gives-up-early", self.wait() * 5 / 4, self.wait() / 4);
+        let limit = wait * (1 << self.unproven.min(DOUBLINGS));
+        // It came to it when it was done with what it was at, which may be later than it was asked.
+        let begins = begins.or(self.free_from.filter(|_| in_turn));
         let until = begins.unwrap_or(asked.at).max(asked.at) + limit;
         let Asked { slave, number, shape, at } = asked;
         if self.owed.len() >= MOST {
@@ -158,6 +162,7 @@ impl FarEnd {
         }
         let asks_whether =
             !self.exactly || self.in_vain.is_multiple_of(ASK_AGAIN) && self.gateway_may_change();
+        let asks_whether = crate::mutant!("far-end-asked-one-more", asks_whether, true);
         if asks_whether && reads && owed == self.serves {
             return None;
         }
@@ -186,6 +191,7 @@ impl FarEnd {
             let soon = SOON.min(self.wait() / 2);
             let is_recent = |owed: &Owed| now.saturating_duration_since(owed.asked) < soon;
             let is_busy = self.owed.iter().all(|owed| is_recent(owed) && !owed.over_a_lost_port);
+            let is_busy = crate::mutant!("far-end-done-is-busy", is_busy, true);
             if is_busy && self.owed.len() >= behind && behind >= self.serves && self.gateway_may_change() {
                 self.serves = behind + 1;
                 self.exactly = false;
@@ -220,7 +226,9 @@ impl FarEnd {
         nobody: bool,
     ) -> Option<Vec<u8>> {
         let is_it = |owed: &Owed| match (owed.number, number) {
-            (Some(owed), Some(number)) => owed == number,
+            (Some(owed), Some(number)) => {
+                crate::mutant!("far-end-any-late-answer", owed == number, true)
+            }
             _ => owed.slave == slave && (owed.shape == shape || shape.is_refusal_of(owed.shape)),
         };
         let at = self.owed.iter().position(is_it)?;
@@ -267,8 +275,12 @@ impl FarEnd {
 
     /// The connection is lost, with this question under way: a gateway that has a line may still be at it.
     pub(super) fn lost(&mut self, under_way: Option<Asked>) {
-        if let Some(asked) = under_way.filter(|_| self.exactly && self.serves < 2) {
+        let goes_on = crate::mutant!("far-end-forgets-at-a-loss", self.exactly && self.serves < 2, false);
+        if let Some(asked) = under_way.filter(|_| goes_on) {
             self.owe(asked);
+        }
+        if crate::mutant!("far-end-free-after-a-loss", false, true) {
+            self.owed.clear();
         }
         for owed in &mut self.owed {
             owed.number = None;
@@ -289,6 +301,8 @@ impl FarEnd {
     /// So many questions, the first of them asked at `asked`, were over at `now`, for want of an answer.
     fn saw(&mut self, now: Instant, asked: Instant, questions: usize) {
         let began = self.free_from.map_or(asked, |free| free.max(asked));
+        let began = crate::mutant!("far-end-waits-since-it-was-asked", began, asked);
+        let questions = crate::mutant!("far-end-waits-for-one", questions, 1);
         let waited = now.saturating_duration_since(began) / u32::try_from(questions).unwrap_or(1).max(1);
         if waited > Duration::ZERO {
             self.seen = Some(waited);
@@ -406,6 +420,38 @@ mod tests {
         far.owe(asked(1, 1, now));
         assert_eq!(far.heard(now + 4 * SECOND, 1, Some(1), Shape::ANY, true), Some(vec![1]));
         assert_eq!(far.wait(), 4 * SECOND);
+    }
+
+    #[test]
+    fn what_waited_in_the_gateway_is_owed_from_when_the_gateway_came_to_it() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
+        far.owe(asked(3, 1, now));
+        // A stop is sent behind it; the gateway says after a second that nobody answered, and only then comes to the stop.
+        assert_eq!(far.heard(now + SECOND, 3, Some(1), Shape::ANY, true), Some(vec![3]));
+        far.owe(asked(4, 2, now + 300 * MS));
+        assert_eq!(far.gate(false), Some(now + 2_250 * MS));
+    }
+
+    #[test]
+    fn a_lost_connection_ends_nothing_that_a_gateway_is_at() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
+        far.owe(asked(3, 1, now));
+        far.lost(Some(asked(1, 2, now + 300 * MS)));
+        assert_eq!(far.owes(), 2);
+        assert_eq!(far.gate(true), Some(now + 1_250 * MS));
+    }
+
+    #[test]
+    fn a_gateway_waits_from_when_it_came_to_a_question() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
+        far.owe(asked(3, 1, now));
+        far.owe(asked(4, 2, now + 300 * MS));
+        assert_eq!(far.heard(now + SECOND, 3, Some(1), Shape::ANY, true), Some(vec![3]));
+        assert_eq!(far.heard(now + 2 * SECOND, 4, Some(2), Shape::ANY, true), Some(vec![4]));
+        assert_eq!(far.wait(), SECOND);
     }
 
     #[test]

@@ -113,7 +113,7 @@ pub fn run(seed: u64, of_each: Duration, mut go_on: impl FnMut() -> bool) -> Tol
             }
         }
         told.count += count;
-        told.details.push(format!("{count:>9} {target:?}"));
+        told.count_as(format!("{target:?}"), count);
         for (number, why) in whys.into_values() {
             let replay = format!("drive-fire fuzz --target {target:?} --execution {number}");
             told.finds.push(Find { what: format!("{target:?}: {why}"), replay });

@@ -136,7 +136,11 @@ impl Cell {
     /// What nobody at this end of the way can tell from what is right: the README of drive-bus lists it.
     pub fn untold(&self) -> impl Iterator<Item = Untold> {
         let of_far_end = self.far_end.untold(self.way, self.fault != Fault::None);
-        of_far_end.into_iter().chain(self.fault.untold(self.way, self.far_end == FarEnd::Fast))
+        let fast = self.far_end == FarEnd::Fast;
+        // An adapter that had never echoed, in front of a drive without supply: the same as an echo behind which the drive hears nothing.
+        let alone = (self.fault == Fault::Echo && self.event.silences()).then_some(Fault::EchoAlone);
+        let of_echo = alone.and_then(|fault| fault.untold(self.way, fast));
+        of_far_end.into_iter().chain(self.fault.untold(self.way, fast)).chain(of_echo)
     }
 
     /// Why it cannot exist, or is another one; `None`: it can.

@@ -23,7 +23,7 @@ pub use axes::{Event, FarEnd, Operation, Subject, Way};
 pub use cell::{Cell, Plane};
 pub use fault::Fault;
 pub use live::{Lived, live, tell};
-pub use plants::{find_again, find_plants};
+pub use plants::{find_again, find_plants, find_plants_by_stories};
 pub use untold::Untold;
 
 use crate::report::{self, Find, Told};
@@ -61,48 +61,44 @@ pub fn shuffled(plane: Plane, seed: u64) -> impl Iterator<Item = Cell> {
     })
 }
 
-/// So many cells of each plane that can exist, or as many as time allows; `go_on` is asked before each.
+/// So many cells of each plane that can exist and came to what is asked of them, in turn, or as many as time allows; `go_on` is asked
+/// before each.
 pub fn run(seed: u64, of_each: u64, mut go_on: impl FnMut() -> bool) -> Told {
     let begun = Instant::now();
     let mut told = Told::new("fault matrix", "cells");
-    let mut outcomes = BTreeMap::<String, u64>::new();
-    for plane in Plane::ALL {
-        let mut lived = 0;
-        for cell in shuffled(plane, seed) {
-            if lived >= of_each || !go_on() {
-                break;
+    let can_exist = |plane| shuffled(plane, seed).filter(|cell: &Cell| cell.cannot_exist().is_none());
+    let mut planes: Vec<_> = Plane::ALL.map(|plane| (plane, can_exist(plane), 0)).into();
+    while !planes.is_empty() {
+        planes.retain_mut(|(plane, cells, lived)| {
+            let Some(cell) = cells.next().filter(|_| *lived < of_each && go_on()) else { return false };
+            if live_and_tell(&cell, &mut told) {
+                *lived += 1;
+                told.count += 1;
+                told.count_as(format!("cells of plane {plane:?}"), 1);
             }
-            if cell.cannot_exist().is_some() {
-                continue;
-            }
-            lived += 1;
-            report::begins(&cell);
-            match live(&cell, &*open(&cell)) {
-                Lived::Told(word) => {
-                    told.count += 1;
-                    *outcomes.entry(word.to_owned()).or_default() += 1;
-                }
-                Lived::BeyondTelling(why) => {
-                    told.count += 1;
-                    *outcomes.entry(format!("wrong, and nobody can tell: {why}")).or_default() += 1;
-                }
-                Lived::NotBegun => {
-                    *outcomes.entry("never came to its operation".to_owned()).or_default() += 1;
-                }
-                Lived::NotReached => {
-                    *outcomes.entry("the operation has fewer exchanges".to_owned()).or_default() += 1;
-                }
-                Lived::Against(why) => {
-                    told.count += 1;
-                    let replay = format!("drive-fire matrix --cell {}", cell.name());
-                    told.finds.push(Find { what: format!("{cell}\n    {}", why.join("\n    ")), replay });
-                }
-            }
-        }
+            true
+        });
     }
-    told.details = outcomes.into_iter().map(|(what, count)| format!("{count:>8} {what}")).collect();
     told.took = begun.elapsed();
     told
+}
+
+/// Whether the cell came to what is asked of it.
+fn live_and_tell(cell: &Cell, told: &mut Told) -> bool {
+    report::begins(cell);
+    let (what, came) = match live(cell, &*open(cell)) {
+        Lived::Told(word) => (word.to_owned(), true),
+        Lived::BeyondTelling(why) => (format!("wrong, and nobody can tell: {why}"), true),
+        Lived::NotBegun => ("not counted: never came to its operation".to_owned(), false),
+        Lived::NotReached => ("not counted: the operation has fewer exchanges".to_owned(), false),
+        Lived::Against(why) => {
+            let replay = format!("drive-fire matrix --cell {}", cell.name());
+            told.finds.push(Find { what: format!("{cell}\n    {}", why.join("\n    ")), replay });
+            ("found".to_owned(), true)
+        }
+    };
+    told.count_as(what, 1);
+    came
 }
 
 /// How many cells there are in each plane, how many of them cannot exist, and why; of the largest plane by a sample of this many.

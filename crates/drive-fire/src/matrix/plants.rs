@@ -1,4 +1,4 @@
-//! What the matrix is to find: families that break their contract, and with the feature `plants` wrong lines of the master.
+//! What cells and stories are to find: families that break their contract, and with the feature `plants` wrong lines of the master.
 
 use std::time::Instant;
 
@@ -9,7 +9,7 @@ use drive_testing::{
     mutants::Mutant,
 };
 
-use super::{Cell, Lived, Plane, live, open, shuffled};
+use super::{Cell, Lived, Plane, Subject, live, open, shuffled, story::Story, tell};
 use crate::report::{Find, Plant, Told};
 
 /// The ways in which a family breaks its contract that show in what it says and does, and not only in how it asks.
@@ -37,9 +37,9 @@ fn control(family: Family) -> Option<u16> {
     })
 }
 
-/// The drive of a cell, with this fault in its family.
-fn broken(mutant: Mutant, cell: &Cell) -> Box<Open> {
-    let family = cell.subject.family();
+/// A drive with this fault in its family.
+fn broken(mutant: Mutant, subject: Subject) -> Box<Open> {
+    let family = subject.family();
     let whole = Contract::new(
         family.capabilities(),
         move |port, slave| family.open_with(port, slave, &family.simulated_options()),
@@ -52,21 +52,47 @@ fn broken(mutant: Mutant, cell: &Cell) -> Box<Open> {
 
 /// Attacks each planted defect, or `only` this one, with the cells of the whole until one finds it, at most so many cells.
 pub fn find_plants(seed: u64, at_most: usize, only: Option<&str>) -> Told {
-    let begun = Instant::now();
-    let mut told = Told::new("fault matrix, against planted defects", "cells");
-    for (name, plant) in all().filter(|(name, _)| only.is_none_or(|only| only == name)) {
-        let can_exist = |plane| shuffled(plane, seed).filter(|cell: &Cell| cell.cannot_exist().is_none());
+    let can_exist = |plane| shuffled(plane, seed).filter(|cell: &Cell| cell.cannot_exist().is_none());
+    let cells = || {
         let mut planes = Plane::ALL.map(can_exist);
+        (0..at_most).map_while(move |turn| planes[turn % Plane::ALL.len()].next())
+    };
+    let attack = |plant: Planted, cell: &Cell| {
+        let (lived, reached) = plant.attacks(cell.subject, |open| live(cell, open));
+        (lived, reached, cell.name())
+    };
+    hunt(Told::new("fault matrix, against planted defects", "cells"), only, cells, attack)
+}
+
+/// The same with stories.
+pub fn find_plants_by_stories(seed: u64, at_most: usize, only: Option<&str>) -> Told {
+    let begin = seed.wrapping_mul(1_000_000_007);
+    let stories = || (1..).filter_map(move |turn| Story::of(begin.wrapping_add(turn))).take(at_most);
+    let attack = |plant: Planted, story: &Story| {
+        let (lived, reached) = plant.attacks(story.subject, |open| tell(story, open));
+        (lived, reached, story.to_string())
+    };
+    hunt(Told::new("worlds generated, against planted defects", "stories"), only, stories, attack)
+}
+
+/// Each planted defect, or `only` this one, until one of the cases finds it.
+fn hunt<C, I: Iterator<Item = C>>(
+    mut told: Told,
+    only: Option<&str>,
+    cases: impl Fn() -> I,
+    attack: impl Fn(Planted, &C) -> (Lived, bool, String),
+) -> Told {
+    let begun = Instant::now();
+    for (name, planted) in all().filter(|(name, _)| only.is_none_or(|only| only == name)) {
         let (mut found_by, mut was_reached) = (None, false);
-        for turn in 0..at_most {
-            let Some(cell) = planes[turn % planes.len()].next() else { break };
+        for (case, number) in cases().zip(1..) {
             told.count += 1;
-            let (lived, reached) = plant.live(&cell);
+            let (lived, reached, by) = attack(planted, &case);
             was_reached |= reached;
             if let Lived::Against(why) = lived {
                 let why: String =
                     why.first().map(String::as_str).unwrap_or_default().chars().take(90).collect();
-                found_by = Some(format!("{} after {} cells: {why}", cell.name(), turn + 1));
+                found_by = Some(format!("{by} after {number}: {why}"));
                 break;
             }
         }
@@ -93,7 +119,7 @@ pub fn find_again(found: &[(&str, &str)]) -> Told {
             continue;
         };
         told.count += 1;
-        let is_found = matches!(plant.live(&cell).0, Lived::Against(_));
+        let is_found = matches!(plant.attacks(cell.subject, |open| live(&cell, open)).0, Lived::Against(_));
         if let Lived::Against(why) = live(&cell, &*open(&cell)) {
             let replay = format!("drive-fire matrix --cell {by}");
             told.finds
@@ -125,15 +151,15 @@ fn all() -> impl Iterator<Item = (String, Planted)> {
 }
 
 impl Planted {
-    /// The cell with this defect, and whether its line was reached.
-    fn live(self, cell: &Cell) -> (Lived, bool) {
+    /// How a drive of this subject lives with this defect, and whether its line was reached.
+    fn attacks(self, subject: Subject, lives: impl Fn(&Open) -> Lived) -> (Lived, bool) {
         match self {
-            Self::Family(mutant) => (live(cell, &*broken(mutant, cell)), true),
+            Self::Family(mutant) => (lives(&*broken(mutant, subject)), true),
             #[cfg(feature = "plants")]
             Self::Line(name) => {
-                // Chosen anew for each cell: what goes round without end in one of them is ended.
+                // Chosen anew for each: what goes round without end in one of them is ended.
                 let _chosen = drive_bus::mutants::choose(name);
-                (live(cell, &*open(cell)), drive_bus::mutants::was_reached(name))
+                (lives(&*super::drive_of(subject)), drive_bus::mutants::was_reached(name))
             }
         }
     }

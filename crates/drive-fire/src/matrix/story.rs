@@ -188,21 +188,19 @@ fn a_step(rng: &mut Rng, subject: Subject, way: Way) -> Step {
 pub fn run(seed: u64, stories: u64, mut go_on: impl FnMut() -> bool) -> Told {
     let begun = Instant::now();
     let mut told = Told::new("worlds generated", "stories");
-    let (mut steps, mut beyond) = (0, 0);
     let mut number = seed.wrapping_mul(1_000_000_007);
     while told.count < stories && go_on() {
         number = number.wrapping_add(1);
         let Some(story) = Story::of(number) else { continue };
         told.count += 1;
         crate::report::begins(&story);
-        steps += story.steps.len();
+        told.count_as("steps", story.steps.len() as u64);
         match tell(&story, &*crate::matrix::drive_of(story.subject)) {
             Lived::Against(why) => told.finds.push(found(&story, &why)),
-            Lived::BeyondTelling(_) => beyond += 1,
+            Lived::BeyondTelling(_) => told.count_as("stories wrong where nobody can tell", 1),
             _ => {}
         }
     }
-    told.details.push(format!("{steps} steps; {beyond} stories wrong where nobody can tell"));
     told.took = begun.elapsed();
     told
 }

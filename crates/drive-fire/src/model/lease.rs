@@ -1,11 +1,24 @@
 //! The lease, explored to the end: what one side gives, loses, withdraws and reads, what others write meanwhile, and what the drive holds.
 //! A drive takes what is written in the order in which it was sent; a word may be on its way while it is read.
 
-use std::{fmt, time::Instant};
-
 use drive_core::{Direction, Evidence, Lease, OwnRun, RunWord, Told as Part, Verdict};
 
-use crate::report::{Find, Plant, Told};
+use super::{Held, Model, names};
+
+/// As it is explored.
+pub(super) const MODEL: Model = Model {
+    name: "lease",
+    part: "model of the lease",
+    against_plants: "model of the lease, against planted defects",
+    settings: &["Drive"],
+    steps: || names(&Step::ALL),
+    lives: |_, steps, defect| {
+        let mut world = World::new(defect.map(|defect| DEFECTS[defect]));
+        steps.iter().try_for_each(|step| world.take(Step::ALL[*step]))
+    },
+    defects: || names(&DEFECTS),
+    lines: false,
+};
 
 /// Run commands of DRIVECOM (BBV51701 p. 20): forward and reverse of this side, and one that only somebody else gives.
 const FORWARD: u16 = 0x000F;
@@ -92,9 +105,6 @@ const DEFECTS: [Defect; 10] = [
     Defect::NothingEndsIt,
     Defect::DeniedEndsTheOneBefore,
 ];
-
-/// Which invariant a sequence breaks, in words.
-type Held = Result<(), &'static str>;
 
 struct World {
     own: OwnRun,
@@ -255,58 +265,4 @@ impl World {
 
 const fn is_run(word: u16) -> bool {
     word & 0x000F == 0x000F
-}
-
-/// A sequence that breaks an invariant.
-struct Broken {
-    what: &'static str,
-    steps: Vec<Step>,
-}
-
-impl fmt::Display for Broken {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "not so: {}, by {:?}", self.what, self.steps)
-    }
-}
-
-/// Every sequence of at most so many steps; the first that breaks anything, and how many states were reached.
-fn explore(depth: usize, defect: Option<Defect>) -> (u64, Option<Broken>) {
-    let mut states = 0;
-    for len in 1..=depth {
-        let mut digits = vec![0_usize; len];
-        loop {
-            states += 1;
-            let steps = || digits.iter().map(|digit| Step::ALL[*digit]);
-            let mut world = World::new(defect);
-            if let Err(what) = steps().try_for_each(|step| world.take(step)) {
-                return (states, Some(Broken { what, steps: steps().collect() }));
-            }
-            let Some(at) = digits.iter().rposition(|digit| *digit + 1 < Step::ALL.len()) else { break };
-            digits[at] += 1;
-            digits[at + 1..].fill(0);
-        }
-    }
-    (states, None)
-}
-
-/// Explores the lease to this depth, and each planted defect until an invariant breaks.
-#[must_use]
-pub fn run(depth: usize) -> Told {
-    let begun = Instant::now();
-    let mut told = Told::new("model of the lease", "states");
-    let (states, broken) = explore(depth, None);
-    told.count = states;
-    told.details.push(format!("every sequence of up to {depth} of {} steps", Step::ALL.len()));
-    told.finds.extend(broken.map(|broken| Find {
-        what: broken.to_string(),
-        replay: format!("drive-fire lease --depth {}", broken.steps.len()),
-    }));
-    for defect in DEFECTS {
-        let (states, broken) = explore(depth, Some(defect));
-        told.count += states;
-        told.plants
-            .push(Plant { name: format!("{defect:?}"), found_by: broken.map(|broken| broken.to_string()) });
-    }
-    told.took = begun.elapsed();
-    told
 }

@@ -1,11 +1,6 @@
-//! Small cases of the master of a line, explored to the end: every sequence of so many steps of a small alphabet, from the beginning.
-//! Nothing is drawn and nothing is left out; what was not asked for within the depth was not looked at.
+//! Small cases of the master of a line, on a wire and behind a gateway.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    fmt,
-    time::Duration,
-};
+use std::{collections::BTreeMap, time::Duration};
 
 use drive_bus::{
     Gateway, LineConfig, SlaveSettings,
@@ -16,6 +11,23 @@ use drive_bus::{
 use drive_core::{Class, PortError, Terms, serial::SerialSettings};
 use tokio::time::Instant;
 use tokio_modbus::{Request, Response};
+
+use super::{Held, Model, names};
+
+/// As it is explored.
+pub(super) const MODEL: Model = Model {
+    name: "master",
+    part: "model of the master",
+    against_plants: "model of the master, against planted defects",
+    settings: &["Wire", "Gateway"],
+    steps: || names(&Step::ALL),
+    lives: |setting, steps, _| {
+        let steps: Vec<Step> = steps.iter().map(|step| Step::ALL[*step]).collect();
+        lives(Setting::ALL[setting], &steps)
+    },
+    defects: Vec::new,
+    lines: true,
+};
 
 const SERIAL: SerialSettings = SerialSettings::MODBUS_DEFAULT;
 const MS: Duration = Duration::from_millis(1);
@@ -158,23 +170,6 @@ struct World {
     busy_at_stop: bool,
     setpoint: u16,
 }
-
-/// What does not hold.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Broken {
-    /// Which invariant, in words.
-    pub what: &'static str,
-    /// By which steps.
-    pub steps: Vec<Step>,
-}
-
-impl fmt::Display for Broken {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} by {:?}", self.what, self.steps)
-    }
-}
-
-type Held = Result<(), &'static str>;
 
 impl World {
     fn new(setting: Setting) -> Self {
@@ -528,45 +523,6 @@ impl World {
         }
         Ok(())
     }
-}
-
-/// What was explored.
-#[derive(Debug, Clone, Default)]
-pub struct Explored {
-    /// States that were reached.
-    pub states: u64,
-    /// What does not hold, each invariant by its shortest sequence.
-    pub broken: BTreeSet<Broken>,
-}
-
-/// Explores every sequence of at most `depth` steps, shorter ones first; ends with the first that breaks anything where `first` is
-/// set.
-#[must_use]
-pub fn explore(setting: Setting, depth: usize, first: bool, mut go_on: impl FnMut() -> bool) -> Explored {
-    let mut explored = Explored::default();
-    let mut seen = BTreeSet::new();
-    for len in 1..=depth {
-        let mut digits = vec![0_usize; len];
-        loop {
-            let steps: Vec<Step> = digits.iter().map(|digit| Step::ALL[*digit]).collect();
-            explored.states += 1;
-            if let Err(what) = lives(setting, &steps)
-                && seen.insert(what)
-            {
-                explored.broken.insert(Broken { what, steps });
-                if first {
-                    return explored;
-                }
-            }
-            if explored.states % 1_024 == 0 && !go_on() {
-                return explored;
-            }
-            let Some(at) = digits.iter().rposition(|digit| *digit + 1 < Step::ALL.len()) else { break };
-            digits[at] += 1;
-            digits[at + 1..].fill(0);
-        }
-    }
-    explored
 }
 
 /// Lives through one sequence, to the end of everything.

@@ -1,0 +1,102 @@
+//! The program itself, built, from outside: a daemon over simulated drives is asked what nobody asks over HTTP and Modbus TCP, and its tools
+//! are given files that somebody else has changed. It does not panic, it ends or goes on, it says nothing that has no form, it keeps no more
+//! than it kept before, and what is asked rightly behind all that is answered rightly.
+
+mod doors;
+mod files;
+mod judge;
+mod plant;
+
+use std::{
+    collections::BTreeMap,
+    io,
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use fastrand::Rng;
+
+pub use judge::find_plants;
+
+use crate::report::{Find, Told};
+use plant::Plant;
+
+/// What is attacked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Target {
+    /// Requests of HTTP.
+    Http,
+    /// Frames of Modbus TCP, at the gateway.
+    Gateway,
+    /// `explain`, of captures as pcap and pcapng.
+    Captures,
+    /// `check`, of a configuration.
+    Configuration,
+    /// `param diff`, of a backup.
+    Backup,
+    /// `history`, of the file of the black box.
+    History,
+}
+
+impl Target {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Http, Self::Gateway, Self::Captures, Self::Configuration, Self::Backup, Self::History];
+}
+
+/// How much more the daemon may hold behind it all, in KiB: caches fill, and allocators keep what they have had.
+const GROWTH: u64 = 64 * 1024;
+
+/// Attacks this program, each target for so long, or one of them by one execution.
+///
+/// # Errors
+/// The program cannot be run as it is to be: what is found is no error.
+pub fn run(
+    program: &Path,
+    seed: u64,
+    of_each: Duration,
+    only: Option<(Target, u64)>,
+    mut go_on: impl FnMut() -> bool,
+) -> io::Result<Told> {
+    let begun = Instant::now();
+    let mut told = Told::new("the program from outside", "executions");
+    let plant = Plant::start(program)?;
+    let files = files::Files::of(&plant)?;
+    let before = plant.memory();
+    for target in Target::ALL.into_iter().filter(|target| only.is_none_or(|(one, _)| one == *target)) {
+        let (began, mut count, mut whys) = (Instant::now(), 0, BTreeMap::new());
+        while began.elapsed() < of_each && go_on() && (only.is_none() || count == 0) {
+            let number =
+                only.map_or(seed.wrapping_mul(1_000_000_007).wrapping_add(count), |(_, number)| number);
+            count += 1;
+            let mut rng = Rng::with_seed(number);
+            let held = match target {
+                Target::Http => doors::http(&plant, &mut rng),
+                Target::Gateway => doors::gateway(&plant, &mut rng),
+                _ => files.execute(target, &plant, &mut rng),
+            };
+            // What lives as before is not asked after each.
+            let held = held.and_then(|()| if count % 64 == 1 { doors::lives(&plant) } else { Ok(()) });
+            if let Err(why) = held {
+                let kind: String = why.chars().take(40).collect();
+                whys.entry(kind).or_insert((number, why));
+            }
+        }
+        told.count += count;
+        told.count_as(format!("{target:?}"), count);
+        for (number, why) in whys.into_values() {
+            let replay = format!("drive-fire program --target {target:?} --execution {number}");
+            told.finds.push(Find { what: format!("{target:?}: {why}"), replay });
+        }
+    }
+    let mut find = |what| told.finds.push(Find { what, replay: format!("drive-fire program --seed {seed}") });
+    doors::lives(&plant).unwrap_or_else(&mut find);
+    judge::log(&plant.log()).unwrap_or_else(&mut find);
+    doors::nothing_moves(&plant).unwrap_or_else(&mut find);
+    if let (Some(before), Some(after)) = (before, plant.memory()) {
+        judge::memory(before, after, GROWTH).unwrap_or_else(&mut find);
+        told.details.push(format!("the daemon: {before} KiB before, {after} KiB behind it"));
+    }
+    told.took = begun.elapsed();
+    Ok(told)
+}

@@ -1,0 +1,163 @@
+//! A daemon over simulated drives, in a folder of its own; both are ended with it.
+
+use std::{
+    fs::{self, File},
+    io::{self, Read as _, Write as _},
+    net::{TcpListener, TcpStream},
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+/// Until it is there, at the most.
+const READY: Duration = Duration::from_secs(60);
+
+pub(super) struct Plant {
+    program: PathBuf,
+    pub(super) folder: PathBuf,
+    pub(super) http: u16,
+    pub(super) gateway: u16,
+    sim: Child,
+    daemon: Option<Child>,
+}
+
+impl Drop for Plant {
+    fn drop(&mut self) {
+        for child in self.daemon.iter_mut().chain([&mut self.sim]) {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
+fn free_port() -> io::Result<u16> {
+    TcpListener::bind("127.0.0.1:0")?.local_addr().map(|address| address.port())
+}
+
+impl Plant {
+    pub(super) fn start(program: &Path) -> io::Result<Self> {
+        let folder = std::env::temp_dir().join(format!("drive-fire-{}", std::process::id()));
+        fs::create_dir_all(&folder)?;
+        let line = folder.join("line");
+        // It ends with its standard input.
+        let sim = Command::new(program)
+            .args([
+                "sim",
+                "--drive",
+                "atv312@1-2",
+                "--drive",
+                "atv21@5",
+                "--baud",
+                "19200",
+                "--format",
+                "8E1",
+                "--pty",
+            ])
+            .arg(&line)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()?;
+        let (http, gateway) = (free_port()?, free_port()?);
+        let mut plant = Self { program: program.to_owned(), folder, http, gateway, sim, daemon: None };
+        plant.until("the simulated line", |_| line.exists())?;
+        fs::write(plant.config(), plant.text(&line))?;
+        let log = File::create(plant.folder.join("log"))?;
+        let daemon = plant
+            .tool()
+            .arg("run")
+            .arg("--config")
+            .arg(plant.config())
+            .arg("--socket")
+            .arg(plant.folder.join("socket"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(log)
+            .spawn()?;
+        plant.daemon = Some(daemon);
+        plant.until("three drives that were identified", |plant| {
+            let answer = plant.ask(plant.http, b"GET /api/v1/drives HTTP/1.1\r\nHost: localhost\r\n\r\n");
+            let text = answer.map(|answer| String::from_utf8_lossy(&answer).into_owned()).unwrap_or_default();
+            text.matches("\"connection\":\"online\"").count()
+                + text.matches("\"connection\": \"online\"").count()
+                >= 3
+                || text.matches("output_frequency").count() >= 3
+        })?;
+        Ok(plant)
+    }
+
+    pub(super) fn config(&self) -> PathBuf {
+        self.folder.join("drives.toml")
+    }
+
+    /// Whoever comes may stop and give setpoints; nobody can start over the gateway, and nobody is asked to start over HTTP.
+    fn text(&self, line: &Path) -> String {
+        let Self { http, gateway, .. } = self;
+        format!(
+            "snapshots = \"1s\"\n[http]\nlisten = \"127.0.0.1:{http}\"\n[defaults]\ncontrol = true\n\
+             watchdog = {{ time = \"10s\", reaction = \"ramp\" }}\n[lines.bench]\nport = \"{},19200,8E1\"\n\
+             [[drives]]\nline = \"bench\"\ndrive = \"atv312@1-2\"\nname = \"pump {{}}\"\n\
+             [[drives]]\nline = \"bench\"\ndrive = \"atv21@5\"\nname = \"fan\"\n\
+             [groups]\npumps = [\"pump 1\", \"pump 2\"]\n\
+             [[gateways]]\nlisten = \"127.0.0.1:{gateway}\"\nwrites = \"stop\"\nvirtual_unit = 247\nmax_age = \"10s\"\n\
+             [history]\n",
+            line.display()
+        )
+    }
+
+    /// The program, with a state folder of this plant.
+    pub(super) fn tool(&self) -> Command {
+        let mut command = Command::new(&self.program);
+        command
+            .env_remove("DRIVED_LOG")
+            .env("RUST_BACKTRACE", "0")
+            .env_remove("RUNTIME_DIRECTORY")
+            .env("XDG_RUNTIME_DIR", &self.folder)
+            .env_remove("STATE_DIRECTORY")
+            .env("XDG_STATE_HOME", self.folder.join("state"));
+        command
+    }
+
+    #[allow(clippy::disallowed_methods, reason = "nothing asynchronous stands here")]
+    fn until(&self, what: &str, is_there: impl Fn(&Self) -> bool) -> io::Result<()> {
+        let begun = Instant::now();
+        while !is_there(self) {
+            if begun.elapsed() > READY {
+                let why = format!("{what} did not come in {READY:?}: {}", self.log());
+                return Err(io::Error::other(why));
+            }
+            thread::sleep(Duration::from_millis(50));
+        }
+        Ok(())
+    }
+
+    /// What is answered to these bytes, behind which nothing comes.
+    pub(super) fn ask(&self, port: u16, bytes: &[u8]) -> io::Result<Vec<u8>> {
+        let mut stream = TcpStream::connect(("127.0.0.1", port))?;
+        stream.set_read_timeout(Some(Duration::from_secs(20)))?;
+        stream.set_write_timeout(Some(Duration::from_secs(20)))?;
+        // What it has refused it need not read.
+        let _ = stream.write_all(bytes).and_then(|()| stream.shutdown(std::net::Shutdown::Write));
+        let mut answer = Vec::new();
+        match stream.read_to_end(&mut answer) {
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+                Err(error)
+            }
+            _ => Ok(answer),
+        }
+    }
+
+    /// What the daemon has said on its standard error.
+    pub(super) fn log(&self) -> String {
+        fs::read_to_string(self.folder.join("log")).unwrap_or_default()
+    }
+
+    /// What it holds in memory, in KiB; `None`: this system does not say.
+    pub(super) fn memory(&self) -> Option<u64> {
+        let status = fs::read_to_string(format!("/proc/{}/status", self.daemon.as_ref()?.id())).ok()?;
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+        line.split_whitespace().next()?.parse().ok()
+    }
+}
