@@ -57,3 +57,30 @@ async fn drives_at_different_speeds_and_formats_are_found_and_saved_and_nothing_
     checked.await.expect("it ends").assert_done();
     std::fs::remove_file(&to).expect("it was ours");
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_drive_from_a_file_is_named_beside_others_by_its_registers_and_nothing_is_written() {
+    drived_config::profiles::ship().expect("nobody has their names");
+    let (line, link) = (SimLine::default(), path("scan-files"));
+    let drives = [("atv312", 1), ("wj200", 3), ("goodrive", 5)].map(|(family, address)| {
+        let family: drive_families::Family = family.parse().expect("it is shipped");
+        let model = drive_families::simulated::model(family, drive_families::SetUp::ForTheBus);
+        line.add_boxed(address, model.expect("it has a twin")).expect("the address is free")
+    });
+    let _serving = line.serve_pty(&link).expect("there is a pty");
+    let port = format!("{},19200,8E1", link.display());
+    let scan = tokio::task::spawn_blocking(move || run(&["scan", "--line", &port, "--addresses", "1-6"]));
+    let scan = scan.await.expect("it ends");
+    for (address, is) in [
+        (1, "atv312 ("),
+        (3, "no drive of a family that is known here"),
+        (5, "likely goodrive, by its registers"),
+    ] {
+        let begin = format!("    {address}  ");
+        let row = scan.out.lines().find(|row| row.starts_with(&begin)).unwrap_or_default();
+        assert!(row.contains(is), "{address}: {scan:?}");
+    }
+    for drive in &drives {
+        assert_eq!([0x05, 0x06, 0x0F, 0x10].map(|write| drive.requests(write)), [0; 4]);
+    }
+}

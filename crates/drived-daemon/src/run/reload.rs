@@ -99,8 +99,7 @@ impl Reloader {
         let Some(scanned) = scanned else { return Ok(()) };
         let changes = changes(config, new);
         let opened = new.lines.iter().filter(|part| changes.iter().any(|change| change.opens(&part.name)));
-        let opened: Vec<_> =
-            opened.map(|part| (part.name.clone(), part.config.endpoint.clone())).collect();
+        let opened: Vec<_> = opened.map(|part| (part.name.clone(), part.config.endpoint.clone())).collect();
         // A name of a server may have to be looked up.
         let is_there = move || Ok(opened.into_iter().find(|(_, endpoint)| is_one_wire(endpoint, &scanned)));
         match blocking(is_there).await? {

@@ -22,8 +22,8 @@ pub(super) fn chapter(drive: &DriveTold, before: Option<&[Backup]>) -> Markup {
         section.drive id=(drive.anchor()) {
             h3 { (drive.name()) }
             p.where {
-                (drive.family_name()) ", address " (drive.view.slave) " on line " (drive.view.line)
-                @if drive.view.control { ", may be commanded" } @else { ", only read" }
+                (drive.family_name()) (own(", address ")) (drive.view.slave) (own(" on line ")) (drive.view.line)
+                @if drive.view.control { (own(", may be commanded")) } @else { (own(", only read")) }
             }
             div.columns {
                 div.block { h4 { "What it is" } (identity(drive)) }
@@ -167,10 +167,10 @@ fn watchdog(drive: &DriveTold) -> Markup {
     let feed = settings.ok().and_then(|settings| settings.feed);
     let has_one = drive.family.as_ref().is_ok_and(|family| family.capabilities().watchdog.is_some());
     let armed = match settings.map(|settings| settings.watchdog_armed) {
-        Ok(Some(true)) => cell("yes"),
-        Ok(Some(false)) => html! { strong { "no" } ": " (UNWATCHED) },
+        Ok(Some(true)) => own("yes"),
+        Ok(Some(false)) => html! { strong { (own("no")) } ": " (own(UNWATCHED)) },
         Ok(None) if !has_one => {
-            html! { span.untold { "this family has none that can be read" } ": " (UNWATCHED) ", unless it is set at the drive" }
+            html! { span.untold { (own("this family has none that can be read")) } ": " (own(UNWATCHED)) (own(", unless it is set at the drive")) }
         }
         Ok(None) => unread("the drive has not told it since the program started"),
         Err(why) => unread(why),
@@ -194,7 +194,7 @@ fn watchdog(drive: &DriveTold) -> Markup {
                 match margin >= 0.0 {
                     true => cell(milliseconds(margin)),
                     false => {
-                        html! { strong { "none" } ": it may run out " (milliseconds(-margin)) " too early" }
+                        html! { strong { (own("none: too late by ")) (milliseconds(-margin)) } }
                     }
                 },
             ));
@@ -237,7 +237,7 @@ fn faults(drive: &DriveTold) -> Markup {
         Err(why) => {
             return html! {
                 @for fault in trips { (present(fault, by_watchdog)) }
-                p { "Alarms and history: " (unread(why)) }
+                p { (own("Alarms and history: ")) (unread(why)) }
             };
         }
     };
@@ -261,11 +261,11 @@ fn faults(drive: &DriveTold) -> Markup {
 }
 
 fn present(fault: Option<Fault>, by_watchdog: bool) -> Markup {
-    let remedy = fault.and_then(|fault| fault.remedy()).unwrap_or("see the manual of the drive");
+    let remedy = fault.and_then(|fault| fault.remedy());
     html! {
         div.trip {
             p { strong { (own("Tripped: ")) (values::tripped(fault.as_ref())) } @if by_watchdog { (own(", by the communication watchdog")) } }
-            p { (own("What to do: ")) (remedy) }
+            p { (own("What to do: ")) @match remedy { Some(remedy) => (remedy), None => (own("see the manual of the drive")) } }
         }
     }
 }

@@ -6,7 +6,7 @@ use super::{
     gather::DriveTold,
     own::LINE,
     plot::{self, Axis, Step},
-    words::{cell, milliseconds, percent, share, span, table},
+    words::{cell, milliseconds, own, percent, share, span, table},
 };
 use drived_plant::plant::views::{AnswersView, LineDetailView, LineErrors, LineLink, SlaveView, StepView};
 
@@ -40,13 +40,13 @@ pub(super) fn chapter(detail: &LineDetailView, drives: &[DriveTold]) -> Markup {
     let LineDetailView { line, measured, .. } = detail;
     html! {
         section.line {
-            h3 { @if line.name == LINE { "The line" } @else { "Line " (line.name) } }
+            h3 { @if line.name == LINE { (own("The line")) } @else { (own("Line ")) (line.name) } }
             p.where { (line.port) ", " (line.protocol) }
             @if line.link == LineLink::Away {
-                p.alarm { "The port is away: " (line.error.as_deref().unwrap_or("no reason is known")) }
+                p.alarm { (own("The port is away: ")) (line.error.as_deref().unwrap_or("–")) }
             }
-            p { "Measured since the line was opened, " (span(measured.elapsed_ms)) " before this report; "
-                (line.exchanges) " requests were sent." }
+            p { (own("Measured since the line was opened: ")) (span(measured.elapsed_ms)) (own(", requests sent: "))
+                (line.exchanges) "." }
             @if !line.findings.is_empty() {
                 h4 { "What is wrong with it" }
                 ul { @for finding in &line.findings {
@@ -76,7 +76,8 @@ pub(super) fn chapter(detail: &LineDetailView, drives: &[DriveTold]) -> Markup {
 fn plan(detail: &LineDetailView) -> Markup {
     let LineDetailView { line, planned, measured, .. } = detail;
     let row = |figure: &str, planned: String, measured: String, verdict: &str| {
-        vec![cell(figure), cell(planned), cell(measured), cell(verdict)]
+        let verdict = if verdict.is_empty() { cell("") } else { own(verdict) };
+        vec![own(figure), cell(planned), cell(measured), verdict]
     };
     let used = measured.utilisation_percent;
     let longest = measured.stop_wait_ms.map(|waited| waited.max);
@@ -159,7 +160,7 @@ fn plan(detail: &LineDetailView) -> Markup {
     ];
     html! {
         (table("list", &["figure", "planned", "measured", "verdict"], 9, rows))
-        p.note { @for (index, (what, number)) in strange.iter().enumerate() { @if index > 0 { "; " } (what) ": " (number) } "." }
+        p.note { @for (index, (what, number)) in strange.iter().enumerate() { @if index > 0 { "; " } (own(what)) ": " (number) } "." }
     }
 }
 
@@ -187,7 +188,7 @@ fn answers(detail: &LineDetailView) -> Markup {
     let all: Vec<(String, &SlaveView, Vec<Step>)> =
         slaves(detail).map(|(name, slave, answers)| (name, slave, steps(answers))).collect();
     let Some(axis) = Axis::of(all.iter().map(|(_, _, steps)| &steps[..])) else {
-        return html! { p.unread { "No slave of this line has answered." } };
+        return html! { p.unread { (own("No slave of this line has answered.")) } };
     };
     let rows = all.iter().map(|(name, slave, steps)| {
         let times = slave.answer_ms;
@@ -197,7 +198,7 @@ fn answers(detail: &LineDetailView) -> Markup {
                 let about = format!("{name}: half of the answers within {half}, the longest {longest}");
                 plot::answer_times(axis, steps, &about)
             }
-            None => html! { span.unread { "has not answered" } },
+            None => html! { span.unread { (own("has not answered")) } },
         };
         vec![
             cell(name),
@@ -210,8 +211,7 @@ fn answers(detail: &LineDetailView) -> Markup {
     });
     html! {
         (table("list", &["slave", "milliseconds, each on the same axis", "half within", "99 of 100", "longest", "given up after"], 2, rows.collect()))
-        p.note { "From the end of a request to the first character of its answer. A bar is as high as its share of the highest of its \
-            slave; answers that were far shorter than the others stand at the left end." }
+        p.note { (own("From the end of a request to the first character of its answer. A bar is as high as its share of the highest of its slave; answers that were far shorter than the others stand at the left end.")) }
     }
 }
 
@@ -245,8 +245,8 @@ fn errors(detail: &LineDetailView) -> Markup {
     html! {
         (table("list errors", &heads, 2, rows.collect()))
         p.note.legend {
-            @if worst > 0 { "A full bar is " (share(worst, of)) " of the exchanges; from left to right: " } @else { "From left to right: " }
-            @for (key, name, _) in kinds { span { span.swatch.(key) {} " " (name) } }
+            @if worst > 0 { (own("A full bar, as a share of the exchanges: ")) (share(worst, of)) "; " } (own("from left to right: "))
+            @for (key, name, _) in kinds { span { span.swatch.(key) {} " " (own(name)) } }
         }
     }
 }
@@ -257,9 +257,9 @@ fn availability(detail: &LineDetailView, drives: &[DriveTold]) -> Markup {
         let (answered, polls) = drive.map(DriveTold::statuses).unwrap_or_default();
         let counters = drive.map(|drive| drive.view.snapshot.counters).unwrap_or_default();
         let now = match (slave.off_line, slave.next_probe_ms) {
-            (false, _) => "asked".to_owned(),
-            (true, Some(next)) => format!("OFF-LINE, asked again in {}", milliseconds(next as f64)),
-            (true, None) => "OFF-LINE".to_owned(),
+            (false, _) => own("asked"),
+            (true, Some(next)) => html! { (own("OFF-LINE, asked again in ")) (milliseconds(next as f64)) },
+            (true, None) => own("OFF-LINE"),
         };
         let about = format!("{name}: {answered} of {polls} statuses came");
         vec![
@@ -270,7 +270,7 @@ fn availability(detail: &LineDetailView, drives: &[DriveTold]) -> Markup {
             cell(counters.missed),
             cell(counters.lost),
             cell(answers.map_or(0, |answers| answers.went_offline)),
-            cell(now),
+            now,
         ]
     });
     table(

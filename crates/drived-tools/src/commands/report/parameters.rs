@@ -10,7 +10,6 @@ use crate::commands::param::{
     diff::{Cell, Comparison, Difference},
     file::Backup,
 };
-use drived_words::output;
 
 pub(super) fn part(drive: &DriveTold) -> Markup {
     match &drive.parameters {
@@ -21,16 +20,15 @@ pub(super) fn part(drive: &DriveTold) -> Markup {
 
 fn differences(compared: &Compared) -> Markup {
     let comparison = &compared.factory;
-    let same = output::counted(comparison.same, "parameter is", "parameters are");
     html! {
         @if comparison.differences.is_empty() { p { (own("None.")) } }
         @else {
             (table("list parameters", &["parameter", "name", "value", "factory"], 2, comparison.differences.iter().map(differing).collect()))
         }
-        p.note { (same) " as the manual prints the factory setting. Read at " (compared.held.head.date) "." }
+        p.note { (own("Parameters as the manual prints the factory setting: ")) (comparison.same) (own(". Read at ")) (compared.held.head.date) "." }
         @if !comparison.unjudged.is_empty() {
             details open {
-                summary.counted { (output::counted(comparison.unjudged.len(), "parameter", "parameters")) " cannot be judged" }
+                summary.counted { (own("Parameters that cannot be judged: ")) (comparison.unjudged.len()) }
                 (table("list parameters", &["parameter", "name", "value", "why"], 9, comparison.unjudged.iter().map(unjudged).collect()))
             }
         }
@@ -65,10 +63,10 @@ fn differing(difference: &Difference) -> Vec<Markup> {
 fn unjudged(difference: &Difference) -> Vec<Markup> {
     let [held, factory] = &difference.sides;
     let why = match (held, factory) {
-        (Cell::Unread(_), _) => html! { "it could not be read" },
-        (Cell::Lacks, _) => html! { "the drive was not asked for it" },
+        (Cell::Unread(_), _) => own("it could not be read"),
+        (Cell::Lacks, _) => own("the drive was not asked for it"),
         (_, Cell::Unread(rule)) => html! { (rule) },
-        (_, _) => html! { "the manual prints no factory setting" },
+        (_, _) => own("the manual prints no factory setting"),
     };
     vec![cell(difference.row.code), cell(difference.row.name), shown(held), why]
 }

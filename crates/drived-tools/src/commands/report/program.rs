@@ -5,13 +5,12 @@ use serde_json::{Value, json};
 
 use super::{
     gather::{DriveTold, Told},
-    words::{cell, facts, milliseconds, moment, table, unread},
+    words::{cell, facts, milliseconds, moment, own, table, unread},
 };
 use drived_plant::plant::{
     recent::RecentView,
     views::{HappenedView, SettingsView},
 };
-use drived_words::output;
 
 /// The newest alarms stand in a report, and how many there are besides.
 const ALARMS: usize = 60;
@@ -114,10 +113,10 @@ pub(super) fn alarms(events: &Told<Vec<RecentView>>, names: &[&str]) -> Markup {
         vec![cell(moment(event.time_unix_ms)), cell(drive), cell(&event.text)]
     };
     html! {
-        @if all.is_empty() { p { "None among the last " (output::counted(events.len(), "event", "events")) " that the program remembers." } }
+        @if all.is_empty() { p { (own("None among the last events that the program remembers: ")) (events.len()) "." } }
         @else {
             (table("list", &["time", "drive", "alarm"], 9, shown.map(row).collect()))
-            @if all.len() > ALARMS { p.note { (all.len() - ALARMS) " older ones are left out." } }
+            @if all.len() > ALARMS { p.note { (own("Older ones that are left out: ")) (all.len() - ALARMS) "." } }
         }
     }
 }

@@ -25,8 +25,8 @@ pub(super) fn overview(gathered: &Gathered) -> Markup {
         let [running_time, ..] = worked.unwrap_or_default();
         let differs = match &drive.parameters {
             Ok(compared) => cell(compared.factory.differences.len()),
-            Err(why) if why == LEFT_OUT => cell("left out"),
-            Err(_) => html! { span.unread { "not read" } },
+            Err(why) if why == LEFT_OUT => own("left out"),
+            Err(_) => html! { span.unread { (own("not read")) } },
         };
         let row = Row::of(view, Instant::now());
         vec![
@@ -136,26 +136,24 @@ fn of_drive(drive: &DriveTold) -> Vec<Finding> {
 fn of_line(detail: &Told<LineDetailView>) -> Vec<Markup> {
     let LineDetailView { line, planned, .. } = match detail {
         Ok(detail) => detail,
-        Err(why) => return vec![html! { "a line: " (unread(why)) }],
+        Err(why) => return vec![html! { (own("a line: ")) (unread(why)) }],
     };
     let mut told = Vec::new();
-    let mut say = |what: Markup| told.push(html! { "line " (line.name) ": " (what) });
+    let mut say = |what: Markup| told.push(html! { (own("line ")) (line.name) ": " (what) });
     if line.link == LineLink::Away {
-        say(
-            html! { strong { "its port is away" } ": " (line.error.as_deref().unwrap_or("no reason is known")) },
-        );
+        say(html! { strong { (own("its port is away")) } ": " (line.error.as_deref().unwrap_or("–")) });
     }
     for (_, name, number) in line.errors.of_exchanges() {
         if number * OFTEN > line.exchanges {
-            say(html! { (share(number, line.exchanges)) " of the exchanges: " (name) });
+            say(html! { (share(number, line.exchanges)) (own(" of the exchanges: ")) (own(name)) });
         }
     }
     if line.errors.foreign.is_some_and(|count| count > 0) {
-        say(html! { "frames of somebody else were heard: a second master may be on it" });
+        say(own("frames of somebody else were heard: a second master may be on it"));
     }
     if planned.utilisation_percent > 100.0 {
         let percent = format!("{:.0} %", planned.utilisation_percent);
-        say(html! { "the settings ask for more than the line has: " (percent) });
+        say(html! { (own("the settings ask for more than the line has: ")) (percent) });
     }
     told
 }

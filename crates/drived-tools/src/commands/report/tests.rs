@@ -136,7 +136,7 @@ async fn what_differs_from_factory_stands_there_in_its_unit_and_what_cannot_be_j
     let chapter = chapter(&html, "atv312@4");
     let ramp = chapter.split_once("\nACC\n").map(|(_, row)| row.lines().take(6).collect::<Vec<_>>()).unwrap();
     assert_eq!((ramp[3], ramp[5]), ("12.5 s", "3.0 s"), "{ramp:?}");
-    let (judged, unjudged) = chapter.split_once("cannot be judged").unwrap();
+    let (judged, unjudged) = chapter.split_once("that cannot be judged").unwrap();
     // p. 30: the nominal current depends on the drive's rating, so no number is printed.
     assert!(unjudged.contains("\nnCr\n") && !judged.contains("\nnCr\n"), "{chapter}");
     assert!(unjudged.contains("the manual has a rule") || unjudged.contains("prints no factory setting"));
@@ -246,6 +246,23 @@ async fn the_words_of_a_report_are_french_and_none_is_missing() {
         "lieu et date",
     ] {
         assert!(french.contains(text), "{text}");
+    }
+    // Nor does a sentence of the program stand in it unmarked.
+    let said = texts(&french);
+    for text in [
+        "may be commanded",
+        "within the plan",
+        "not measured",
+        "requests",
+        "cannot be judged",
+        "factory setting",
+        "that the program remembers",
+        "From the end of",
+        "rom left to right",
+        "has not answered",
+        "on line ",
+    ] {
+        assert!(!said.contains(text), "{text}");
     }
     // What was said by others is as it was.
     for text in ["Hall 3", "order &lt;4711&gt;", "ATV312"] {
