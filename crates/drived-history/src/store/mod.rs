@@ -112,6 +112,11 @@ pub fn open_to_read(path: &Path) -> Result<Connection, StoreError> {
     connection.busy_timeout(PATIENCE)?;
     match check(&connection, path)? {
         0 => Err(StoreError::Missing(path.to_owned())),
+        // It is read as it stands until a daemon brings it to this version.
+        2 => {
+            connection.execute_batch(schema::CHUNKS_OF_SECOND)?;
+            Ok(connection)
+        }
         _ => Ok(connection),
     }
 }

@@ -179,6 +179,10 @@ const THIRD: &str = "
 ALTER TABLE chunk ADD COLUMN form INTEGER NOT NULL DEFAULT 1;
 ";
 
+/// How chunks of the second version are read as those of the third, by a reader who changes nothing in the file.
+pub(crate) const CHUNKS_OF_SECOND: &str =
+    "CREATE TEMP VIEW chunk AS SELECT id, start_ms, end_ms, data, 1 AS form FROM main.chunk";
+
 /// The version that is written here.
 #[must_use]
 pub fn version() -> i64 {

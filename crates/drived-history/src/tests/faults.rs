@@ -260,6 +260,37 @@ fn a_file_of_the_first_version_is_brought_to_this_one_with_all_that_is_in_it() {
 }
 
 #[test]
+fn a_file_of_the_second_version_is_read_as_it_stands() {
+    let folder = Folder::new("history-second");
+    let path = folder.file("history.sqlite");
+    let store = store::open(&path).unwrap().store;
+    let column = crate::column::pack(0, &[crate::column::Point { at: 1_000, count: Some(50) }]);
+    let mut data = Vec::new();
+    crate::column::write_number(&mut data, u64::from(HZ.0));
+    crate::column::write_number(&mut data, column.len() as u64);
+    data.extend(column);
+    store
+        .connection
+        .execute_batch(
+            "ALTER TABLE chunk DROP COLUMN form; PRAGMA user_version = 2;
+             INSERT INTO source (id, drive, part) VALUES (1, 'pump', 'status');
+             INSERT INTO flush (id, segment, start_ms, end_ms) VALUES (1, 1, 0, 2000);",
+        )
+        .unwrap();
+    let id = (1_i64 << crate::read::SOURCE_BITS) | 1;
+    store
+        .connection
+        .execute("INSERT INTO chunk (id, start_ms, end_ms, data) VALUES (?1, 0, 2000, ?2)", (id, data))
+        .unwrap();
+    drop(store);
+    let before = fs::read(&path).unwrap();
+    let history = History::open(&path).unwrap();
+    let pieces = crate::read::pieces(&history.0, "pump", HZ, 0, 5_000).unwrap();
+    assert_eq!(pieces[0].points, [crate::column::Point { at: 1_000, count: Some(50) }]);
+    assert_eq!(fs::read(&path).unwrap(), before);
+}
+
+#[test]
 fn every_value_of_a_setting_that_was_read_is_kept_with_its_times() {
     let folder = Folder::new("history-settings");
     let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
