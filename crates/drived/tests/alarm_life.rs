@@ -292,7 +292,7 @@ fn a_trip_is_told_taken_note_of_and_over_the_same_at_every_face() {
     let home = home.map(|python| HomeAssistant::start(&python, path("alarm-life-home"), &broker));
     let mut daemon = Running::start(&["run", "--config", file.path()]);
     daemon.wait_for(r#""event":"identified""#);
-    let prometheus = Prometheus::start("alarm-life-prometheus", &[http]);
+    let prometheus = Prometheus::start("alarm-life-prometheus", &[file.path()]);
     let page = Page::is_installed().then(|| Page::open(http));
     let mut faces = Faces { http, ear, host, home, page, prometheus, receiver };
     println!(

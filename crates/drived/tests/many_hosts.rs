@@ -22,7 +22,7 @@ struct Host {
     port: u16,
     daemon: Running,
     sim: Sim,
-    _file: File,
+    file: File,
 }
 
 impl Host {
@@ -44,7 +44,7 @@ impl Host {
         for _ in 0..2 {
             daemon.wait_for(r#""event":"connected""#);
         }
-        Self { port, daemon, sim, _file: file }
+        Self { port, daemon, sim, file }
     }
 }
 
@@ -88,8 +88,8 @@ fn one_prometheus_sees_three_daemons_and_fires_when_a_drive_of_one_trips() {
         return;
     }
     let mut hosts = ["north", "east", "south"].map(Host::start);
-    let ports: Vec<u16> = hosts.iter().map(|host| host.port).collect();
-    let mut prometheus = Prometheus::start("prometheus", &ports);
+    let files: Vec<&str> = hosts.iter().map(|host| host.file.path()).collect();
+    let mut prometheus = Prometheus::start("prometheus", &files);
     prometheus.wait(|prometheus| {
         let up = prometheus.query(r#"sum(up{job="drived"}) == 3 and sum(drived_drive_up) == 6"#)?;
         up.contains("\"value\"").then_some(())
@@ -163,7 +163,7 @@ fn three_daemons_follow_a_broker_that_moves_tell_it_everything_again_and_are_mis
 
 #[test]
 fn whoever_scrapes_without_end_holds_up_no_line() {
-    let Host { port, mut daemon, sim: _sim, _file } = Host::start("scraped");
+    let Host { port, mut daemon, sim: _sim, file: _file } = Host::start("scraped");
     let ends = AtomicBool::new(false);
     thread::scope(|scope| {
         let scrapers: Vec<_> = (0..8)

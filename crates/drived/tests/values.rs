@@ -310,7 +310,7 @@ impl Plant {
         };
         let Some(state) = row("state").filter(|_| row("status").is_none()) else { return Said::NOTHING };
         // Its direction, and what has tripped it, are values of their own.
-        let is_of_it = |word: &&str| !["fwd", "rev"].contains(word) && word.contains(char::is_lowercase);
+        let is_of_it = |word: &&str| !["fwd", "rev"].contains(word) && word.chars().all(char::is_lowercase);
         let state: Vec<&str> = state.split_whitespace().filter(is_of_it).collect();
         Said {
             frequency: row("output frequency").and_then(|text| read(text, "Hz")).map(hundredths),
@@ -664,5 +664,17 @@ fn every_face_tells_what_the_drives_say_while_they_move_trip_are_renamed_lost_an
         assert_eq!(home.complaints(), Vec::<String>::new());
     }
     assert_eq!(plant.daemon.interrupt().0, Some(0));
+    // What became of it by either name is found by its id.
+    let config = plant.folder.join("drives.toml").display().to_string();
+    let audited = run(&["audit", "show", "--about", "the atv28", "--json", "--config", &config]);
+    let rows =
+        audited.assert_done().lines().map(|row| serde_json::from_str::<Value>(row).expect("an object"));
+    let of_it: Vec<Value> = rows.filter(|row| row["drive"] == "the atv28").collect();
+    for what in ["the atv28: start", "the mixer: exit"] {
+        assert!(
+            of_it.iter().any(|row| row["what"].as_str().is_some_and(|said| said.starts_with(what))),
+            "{of_it:#?}"
+        );
+    }
     fs::remove_dir_all(&plant.folder).expect("it is there");
 }

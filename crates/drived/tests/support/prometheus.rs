@@ -18,17 +18,21 @@ pub(crate) struct Prometheus {
 }
 
 impl Prometheus {
-    /// It scrapes the daemons at these ports each second, and judges the rules that the program gives out.
-    pub(crate) fn start(name: &str, ports: &[u16]) -> Self {
+    /// It scrapes the daemons of these configurations each second, found by the files in which `drived export file-sd` says where they are,
+    /// and judges the rules that the program gives out.
+    pub(crate) fn start(name: &str, configurations: &[&str]) -> Self {
         let (folder, port) = (path(name), free_port());
         fs::create_dir_all(&folder).expect("it can be made");
+        for (number, file) in configurations.iter().enumerate() {
+            let found = run(&["export", "file-sd", "--config", file, "--host", "localhost"]);
+            let to = folder.join(format!("host-{number}.json"));
+            fs::write(to, found.assert_done()).expect("it can be written");
+        }
         let rules = run(&["export", "alerts"]);
         fs::write(folder.join("rules.yml"), rules.assert_done()).expect("it can be written");
-        let targets: Vec<String> = ports.iter().map(|port| format!("\"127.0.0.1:{port}\"")).collect();
         let config = format!(
             "global: {{ scrape_interval: 1s, evaluation_interval: 1s }}\nrule_files: [rules.yml]\nscrape_configs:\n\
-             \x20 - {{ job_name: drived, static_configs: [{{ targets: [{}] }}] }}\n",
-            targets.join(", ")
+             \x20 - {{ job_name: drived, file_sd_configs: [{{ files: [\"host-*.json\"] }}] }}\n"
         );
         fs::write(folder.join("prometheus.yml"), config).expect("it can be written");
         let child = Command::new("prometheus")
