@@ -85,6 +85,9 @@ mod planted {
         ("line: silence-unkept", "E:76152"),
         ("line: pause-unkept", "E:18204"),
         ("line: command-sent-late", "E:26300"),
+        ("line: lost-write-told-as-expired", "A:200156991"),
+        ("line: sent-told-as-unsent", "F:2066341"),
+        ("line: late-answer-unfeared", "F:2261288"),
     ];
 
     #[test]

@@ -139,7 +139,11 @@ impl Plant {
         stream.set_read_timeout(Some(Duration::from_secs(20)))?;
         stream.set_write_timeout(Some(Duration::from_secs(20)))?;
         // What it has refused it need not read.
-        let _ = stream.write_all(bytes).and_then(|()| stream.shutdown(std::net::Shutdown::Write));
+        let _ = stream.write_all(bytes);
+        // A server of HTTP gives up a request whose client says nothing more; who wants his answer says that he waits for the end.
+        if !bytes.windows(17).any(|header| header == b"Connection: close") {
+            let _ = stream.shutdown(std::net::Shutdown::Write);
+        }
         let mut answer = Vec::new();
         match stream.read_to_end(&mut answer) {
             Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
