@@ -264,8 +264,17 @@ pub async fn stop<D: Drivecom>(drive: &mut D, mode: StopMode) -> Result<Stopped>
     loop {
         let status = drive.read_status(Class::Command).await.map_err(Error::after_write)?;
         reads += 1;
-        // A motor that stands at a setpoint of zero shows a stop that never arrived.
-        let shown = written.is_ok() && drive.shows_stop(&stop, &status);
+        // A motor that stands at a setpoint of zero shows a stop that never arrived, and one that slows down for another reason one
+        // that was acknowledged only.
+        let shown = drive.shows_stop(&stop, &status)
+            && match &written {
+                Err(_) => false,
+                Ok(Taken::Confirmed) => true,
+                Ok(Taken::Acknowledged) => {
+                    let held = drive.read_control().await.map_err(Error::after_write)?;
+                    !drive.is_run(held)
+                }
+            };
         let elsewhere = status.control.is_some_and(|control| control != Control::Bus);
         if !corrected && (elsewhere || !shown) {
             corrected = true;
@@ -295,13 +304,21 @@ pub async fn stop<D: Drivecom>(drive: &mut D, mode: StopMode) -> Result<Stopped>
     }
 }
 
+/// What the drive said to the write of a stop.
+enum Taken {
+    /// It has taken it.
+    Confirmed,
+    /// It takes it later (exception 05h), or so it says: the word that it holds shows whether it has.
+    Acknowledged,
+}
+
 /// Writes a stop. What says that it did not arrive, or leaves it open, is for the reading behind it to judge; only what kept
 /// it from being sent ends the stop.
-async fn write_stop<D: Drivecom>(drive: &mut D, stop: &StopWord) -> Result<Result<()>> {
+async fn write_stop<D: Drivecom>(drive: &mut D, stop: &StopWord) -> Result<Result<Taken>> {
     match drive.write_control(Class::Stop, stop.word, Effect::Level).await {
-        Err(error) if means(&error, ExceptionMeaning::Accepted) => Ok(Ok(())),
+        Err(error) if means(&error, ExceptionMeaning::Accepted) => Ok(Ok(Taken::Acknowledged)),
         Err(error) if error.kind() == ErrorKind::NotSent => Err(error),
-        written => Ok(written),
+        written => Ok(written.map(|()| Taken::Confirmed)),
     }
 }
 

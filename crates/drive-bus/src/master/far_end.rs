@@ -160,9 +160,11 @@ impl FarEnd {
         if owed == 0 || owed < self.serves {
             return None;
         }
-        let asks_whether =
-            !self.exactly || self.in_vain.is_multiple_of(ASK_AGAIN) && self.gateway_may_change();
-        let asks_whether = crate::mutant!("far-end-asked-one-more", asks_whether, true);
+        let asks_whether = crate::mutant!(
+            "far-end-asked-one-more",
+            !self.exactly || self.in_vain.is_multiple_of(ASK_AGAIN) && self.gateway_may_change(),
+            true
+        );
         if asks_whether && reads && owed == self.serves {
             return None;
         }
@@ -190,8 +192,11 @@ impl FarEnd {
             // Later it may be done with what was asked, though nobody was told; with what a lost connection has asked, at once.
             let soon = SOON.min(self.wait() / 2);
             let is_recent = |owed: &Owed| now.saturating_duration_since(owed.asked) < soon;
-            let is_busy = self.owed.iter().all(|owed| is_recent(owed) && !owed.over_a_lost_port);
-            let is_busy = crate::mutant!("far-end-done-is-busy", is_busy, true);
+            let is_busy = crate::mutant!(
+                "far-end-done-is-busy",
+                self.owed.iter().all(|owed| is_recent(owed) && !owed.over_a_lost_port),
+                true
+            );
             if is_busy && self.owed.len() >= behind && behind >= self.serves && self.gateway_may_change() {
                 self.serves = behind + 1;
                 self.exactly = false;
@@ -300,10 +305,13 @@ impl FarEnd {
 
     /// So many questions, the first of them asked at `asked`, were over at `now`, for want of an answer.
     fn saw(&mut self, now: Instant, asked: Instant, questions: usize) {
-        let began = self.free_from.map_or(asked, |free| free.max(asked));
-        let began = crate::mutant!("far-end-waits-since-it-was-asked", began, asked);
-        let questions = crate::mutant!("far-end-waits-for-one", questions, 1);
-        let waited = now.saturating_duration_since(began) / u32::try_from(questions).unwrap_or(1).max(1);
+        let began = crate::mutant!(
+            "far-end-waits-since-it-was-asked",
+            self.free_from.map_or(asked, |free| free.max(asked)),
+            asked
+        );
+        let shares = crate::mutant!("far-end-waits-for-one", u32::try_from(questions).unwrap_or(1).max(1), 1);
+        let waited = now.saturating_duration_since(began) / shares;
         if waited > Duration::ZERO {
             self.seen = Some(waited);
         }

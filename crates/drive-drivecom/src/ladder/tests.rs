@@ -313,6 +313,18 @@ async fn a_stop_that_a_late_run_command_overtakes_is_written_again() {
     assert_eq!((drive.eta, drive.written), (0x0023, vec![SWITCH_ON; 2]));
 }
 
+/// Exception 05h says that the drive works on it. One that never takes the word, and shows what a stop looks like for another reason,
+/// goes on to hold the run command.
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_is_acknowledged_is_confirmed_only_where_the_drive_holds_no_run_command() {
+    let mut holds = Chart { exceptions: vec![5; 100], keeps: Some(ENABLE_OPERATION), ..Chart::at(0x0023) };
+    let told = stop(&mut holds, StopMode::Ramp).await.unwrap_err();
+    assert!(matches!(told, Error::NotConfirmed { command: Command::Stop(_), .. }), "{told}");
+    assert!(holds.written.len() > 1, "it is written again");
+    let mut takes = Chart { exceptions: vec![5], ..Chart::at(0x0027) };
+    assert!(stop(&mut takes, StopMode::Ramp).await.is_ok());
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_stop_goes_on_behind_exceptions_and_lasts_for_its_time() {
     for (exceptions, written) in [(vec![5], 1), (vec![6], 1), (vec![6, 4, 6], 1)] {
