@@ -178,7 +178,7 @@ impl World {
         match step {
             Step::Read => self.ask(1, Request::ReadHoldingRegisters(READ, 2), Terms::of(Class::Status))?,
             Step::Neighbour => {
-                self.ask(2, Request::ReadHoldingRegisters(READ, 2), Terms::of(Class::Status))?
+                self.ask(2, Request::ReadHoldingRegisters(READ, 2), Terms::of(Class::Status))?;
             }
             Step::Absent => self.ask(3, Request::ReadHoldingRegisters(READ, 2), Terms::of(Class::Status))?,
             Step::Command => {
@@ -187,7 +187,7 @@ impl World {
             }
             Step::Stop => self.ask(1, Request::WriteSingleRegister(STOP, value), Terms::of(Class::Stop))?,
             Step::StopInVain => {
-                self.ask(3, Request::WriteSingleRegister(STOP, value), Terms::of(Class::Stop))?
+                self.ask(3, Request::WriteSingleRegister(STOP, value), Terms::of(Class::Stop))?;
             }
             Step::Dies => {
                 if !self.dead.remove(&1) {

@@ -33,9 +33,9 @@ pub(super) fn gateway(sent: &[u8], mut answers: &[u8]) -> Result<(), String> {
             return Err(format!("a frame that is cut off or too long: {answers:02X?}"));
         };
         let asked = sent.windows(8).any(|request| {
-            request[..4] == [a, b, 0, 0] && request[6] == unit && request[7] == function & 0x7F
-                // A function code that is set in its highest bit is refused as it is.
-                || request[..4] == [a, b, 0, 0] && request[6] == unit && request[7] | 0x80 == function
+            // A function code that is set in its highest bit is refused as it is.
+            let is_of_it = request[7] == function & 0x7F || request[7] | 0x80 == function;
+            request[..4] == [a, b, 0, 0] && request[6] == unit && is_of_it
         });
         if !asked {
             return Err(format!("nobody has asked for {:02X?}", &answers[..len]));
