@@ -30,10 +30,8 @@ impl Prometheus {
         }
         let rules = run(&["export", "alerts"]);
         fs::write(folder.join("rules.yml"), rules.assert_done()).expect("it can be written");
-        let config = format!(
-            "global: {{ scrape_interval: 1s, evaluation_interval: 1s }}\nrule_files: [rules.yml]\nscrape_configs:\n\
-             \x20 - {{ job_name: drived, file_sd_configs: [{{ files: [\"host-*.json\"] }}] }}\n"
-        );
+        let config = "global: { scrape_interval: 1s, evaluation_interval: 1s }\nrule_files: [rules.yml]\nscrape_configs:\n\
+             \x20 - { job_name: drived, file_sd_configs: [{ files: [\"host-*.json\"] }] }\n";
         fs::write(folder.join("prometheus.yml"), config).expect("it can be written");
         let child = Command::new("prometheus")
             .arg(format!("--config.file={}", folder.join("prometheus.yml").display()))

@@ -1,5 +1,8 @@
 //! The built program on a terminal of this test's own, and what stands on its screen.
 
+// Not every test needs all of it.
+#![allow(dead_code)]
+
 use std::{
     fs::File,
     io::{Read as _, Write as _},
