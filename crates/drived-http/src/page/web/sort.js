@@ -2,7 +2,7 @@
 
 import { byName } from './format.js';
 import { age } from './plant.js';
-import { trouble } from './trouble.js';
+import { isTrouble, trouble } from './trouble.js';
 import { word } from './vocabulary.js';
 import { deviationOf, stateWord } from './words.js';
 
@@ -22,6 +22,12 @@ const AGAIN_MS = 3_000;
 
 let last = { sort: '', at: 0, names: new Map() };
 
+/** How early a drive comes where nobody sorts: a note is no trouble, and moves no row. */
+function urgency(drive) {
+  const worst = trouble(drive);
+  return isTrouble(worst) ? worst.rank : Infinity;
+}
+
 /** Whether drives are sorted by this column. */
 export function isSortable(column) {
   return column in VALUES;
@@ -31,7 +37,7 @@ export function isSortable(column) {
 export function sorted(drives, sort, isFree) {
   const column = sort.replace('-', '');
   // The order of the configuration among equals: a row moves only when its trouble begins or ends.
-  if (!isSortable(column)) return [...drives].sort((one, other) => (trouble(one).rank - trouble(other).rank) || 0);
+  if (!isSortable(column)) return [...drives].sort((one, other) => (urgency(one) - urgency(other)) || 0);
   const isDue = isFree && performance.now() - last.at > AGAIN_MS;
   if (sort !== last.sort || isDue || drives.some(drive => !last.names.has(drive.name))) {
     const values = new Map(drives.map(drive => [drive, VALUES[column](drive)]));
