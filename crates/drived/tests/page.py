@@ -403,8 +403,8 @@ def dead(page, url):
     """A stop of drives that do not answer is told of each as what it is, in the account and in every row."""
     page.goto(url)
     live(page)
-    standing = page.locator("[data-filter=standing_drives]")
-    expect(standing).to_have_text("Standing 3")
+    undriven = page.locator("[data-filter=undriven_drives]")
+    expect(undriven).to_have_text("Not driven 3")
     happen("line cut")
     page.locator("#stop").click()
     account = page.locator("#stop-account")
@@ -415,11 +415,11 @@ def dead(page, url):
     rows = page.locator(".rows .row")
     for row in range(3):
         expect(rows.nth(row)).to_contain_text("STOP NOT CONFIRMED, the motor may turn")
-    # Nor does a drive stand of which nobody knows.
-    expect(standing).to_have_text("Standing 0")
+    # Nor is a drive told undriven of which nobody knows.
+    expect(undriven).to_have_text("Not driven 0")
     happen("line join")
     all_are_accounted_for(page)
-    expect(standing).to_have_text("Standing 3")
+    expect(undriven).to_have_text("Not driven 3")
 
 
 def clocks(page, url):

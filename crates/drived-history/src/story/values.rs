@@ -49,13 +49,21 @@ pub(super) fn before(
     match known.is_empty() {
         true => said.push(Sentence::of(Certainty::NotKnown, "how it was a moment before is not known")),
         false => {
-            let text = match gap {
+            // When it was read that it was so nobody has kept, where every poll showed the same: no moment is told for it.
+            said.push(match gap {
                 Some(start) => {
-                    format!("{} (as it was read last, {} before)", known.join(", "), lasting(moment - start))
+                    let text = format!(
+                        "{} (as it was read last, {} before)",
+                        known.join(", "),
+                        lasting(moment - start)
+                    );
+                    Sentence::of(Certainty::Seen, text).at(at)
                 }
-                None => format!("{} (as the poll before showed it)", known.join(", ")),
-            };
-            said.push(Sentence::of(Certainty::Seen, text).at(at));
+                None => Sentence::of(
+                    Certainty::Seen,
+                    format!("{} (as the poll before showed it)", known.join(", ")),
+                ),
+            });
         }
     }
     Ok(said)

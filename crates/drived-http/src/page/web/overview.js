@@ -25,13 +25,13 @@ const ROWS_AT_ONCE = 24;
 const OFF_SETPOINT_HZ = 2;
 
 const MOVING = new Set(['running', 'stopping', 'quick_stop', 'fault_reaction']);
-const STANDING = new Set(['at_rest', 'held']);
+const UNDRIVEN = new Set(['at_rest', 'held', 'coasting']);
 const FILTERS = {
   all: () => true,
   trouble: drive => isTrouble(trouble(drive)),
   running_drives: drive => MOVING.has(drive.status?.state),
   // What stands is known to: no output is not standstill, and of a drive that is lost nobody knows.
-  standing_drives: drive => quality(drive.status) === 'good' && STANDING.has(drive.status.motion),
+  undriven_drives: drive => quality(drive.status) === 'good' && UNDRIVEN.has(drive.status.motion),
   off_setpoint: drive => Math.abs(deviationOf(drive) ?? 0) > OFF_SETPOINT_HZ,
 };
 

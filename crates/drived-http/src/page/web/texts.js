@@ -36,7 +36,7 @@ const TABLE = {
   group: ['Group', 'Groupe'],
   trouble: ['Trouble', 'Anomalies'],
   running_drives: ['Running', 'En marche'],
-  standing_drives: ['Standing', 'À l’arrêt'],
+  undriven_drives: ['Not driven', 'Non entraînés'],
   drives_shown: ['{count} drives', '{count} variateurs'],
   nothing_found: ['No drive fits the search.', 'Aucun variateur ne correspond.'],
   drive: ['Drive', 'Variateur'],
