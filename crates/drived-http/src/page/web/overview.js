@@ -30,7 +30,7 @@ const FILTERS = {
   all: () => true,
   trouble: drive => isTrouble(trouble(drive)),
   running_drives: drive => MOVING.has(drive.status?.state),
-  // What stands is known to: no output is not standstill, and of a drive that is lost nobody knows.
+  // Of a drive that is lost nobody knows whether it is driven.
   undriven_drives: drive => quality(drive.status) === 'good' && UNDRIVEN.has(drive.status.motion),
   off_setpoint: drive => Math.abs(deviationOf(drive) ?? 0) > OFF_SETPOINT_HZ,
 };
