@@ -181,6 +181,7 @@ fn it_draws_what_the_terminal_has_and_ends_in_order_with_it() {
     let screen =
         monitor.wait_until("a live drive", |screen| screen.contains("0.0 A") && screen.contains("live"));
     assert!(screen.is_ascii(), "{screen}");
+    assert!(!monitor.loses_output_by_a_signal());
     monitor.hang_up();
     let (code, screen, is_given_back) = monitor.end();
     assert_eq!((code, is_given_back), (Some(0), true), "{screen}");

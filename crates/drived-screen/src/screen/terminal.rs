@@ -88,6 +88,9 @@ mod keys {
         let Ok(before) = tcgetattr(stdin()) else { return };
         let mut quiet = before.clone();
         quiet.local_modes -= LocalModes::ECHO | LocalModes::ICANON | LocalModes::IEXTEN;
+        // Else a key that makes a signal throws away what is on its way to the terminal, and does so behind the signal: it would be
+        // what this writes at its end, by which the terminal is given back.
+        quiet.local_modes |= LocalModes::NOFLSH;
         quiet.input_modes -= InputModes::IXON;
         if tcsetattr(stdin(), OptionalActions::Now, &quiet).is_ok() {
             *BEFORE.lock().unwrap_or_else(PoisonError::into_inner) = Some(before);

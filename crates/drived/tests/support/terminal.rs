@@ -14,7 +14,7 @@ use std::{
 
 use rustix::{
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
-    termios::{Action, Winsize, tcflow, tcgetattr, tcsetwinsize},
+    termios::{Action, LocalModes, Winsize, tcflow, tcgetattr, tcsetwinsize},
 };
 
 /// How long anything may take that comes at all.
@@ -113,6 +113,11 @@ impl Terminal {
         tcflow(&self.end, action).expect("it can be held");
     }
 
+    /// Whether a key that makes a signal throws away what is on its way to the terminal (termios(3), NOFLSH).
+    pub(crate) fn loses_output_by_a_signal(&self) -> bool {
+        !tcgetattr(&self.end).expect("it has modes").local_modes.contains(LocalModes::NOFLSH)
+    }
+
     /// Waits for the end: the exit code, what was said at last, and whether the terminal is as it was: with the lines that
     /// were there before, a cursor, an echo, and lines.
     pub(crate) fn end(mut self) -> (Option<i32>, String, bool) {
@@ -126,7 +131,6 @@ impl Terminal {
         while let Ok(bytes) = self.said.recv_timeout(quiet(&self.screen)) {
             self.screen.take(&bytes);
         }
-        use rustix::termios::LocalModes;
         let is_given_back = modes.contains(LocalModes::ECHO | LocalModes::ICANON | LocalModes::IEXTEN)
             && !self.screen.is_alternate
             && !self.screen.is_cursor_hidden;
