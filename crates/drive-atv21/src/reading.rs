@@ -12,6 +12,7 @@ use tokio_modbus::prelude::ReadCode;
 use crate::{
     Atv21,
     blocks::{self, Blocks, READ_BLOCK, ReadSlot, WriteSlot},
+    control::status_word,
     faults::{FAULTS, alarms},
     in_effect::{self, ReadBlock},
     model::{self, ModelEntry},
@@ -107,7 +108,12 @@ impl<P: Port> Atv21<P> {
         }
         self.registers.begin_snapshot();
         let words = self.read_each(Class::Command, &[map::STATUS_WORD, map::COMMAND_SOURCE]).await?;
-        Ok(Status { at: self.registers.snapshot_time(), ..status::status(words) })
+        let status = Status { at: self.registers.snapshot_time(), ..status::status(words) };
+        // A motor that somebody else runs does not stand any more, though its next status may show no output.
+        if status_word(&status).contains(StatusWord::RUN) {
+            self.watch.shaft.may_turn();
+        }
+        Ok(status)
     }
 
     pub(crate) async fn read_measurements(&mut self) -> Result<Measurements> {

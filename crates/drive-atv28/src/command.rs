@@ -135,7 +135,7 @@ impl<P: Port> Drivecom for Atv28<P> {
         *status = self.status_of(&words);
         status.raw.push(raw_command(held));
         let direction = ControlWord::from_bits_retain(word).direction();
-        let shown = words.state_words().shows_run(direction, words.reference());
+        let shown = words.state_words().shows_run(direction, words.reference(), words.output());
         if held != word || in_force.is_none() || shown == RunShown::NotYet {
             return Ok(RunShown::NotYet);
         }

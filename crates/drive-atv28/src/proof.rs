@@ -90,7 +90,7 @@ impl<P: Port> Atv28<P> {
 
     pub(crate) fn evidence(&self, words: &FastWords) -> Option<Evidence> {
         let lease = self.proof.watch.run.lease()?;
-        let mut evidence = words.state_words().evidence(lease, words.reference());
+        let mut evidence = words.state_words().evidence(lease, words.reference(), words.output());
         evidence.word = self.proof.told_word(|held| ControlWord::from_bits_retain(held).stands_for(lease));
         if evidence.reference == Told::Yes {
             evidence.reference = self.told_reference(words);

@@ -244,7 +244,7 @@ impl<P: Port> Drivecom for Atv312<P> {
             return Ok(RunShown::NotYet);
         }
         let direction = ControlWord::from_bits_retain(word).direction();
-        let shown = words.state_words().shows_run(direction, words.reference());
+        let shown = words.state_words().shows_run(direction, words.reference(), self.output(&words));
         if !follows || shown == RunShown::NotYet {
             return Ok(RunShown::NotYet);
         }

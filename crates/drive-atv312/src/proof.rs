@@ -171,7 +171,7 @@ impl<P: Port> Atv312<P> {
     pub(crate) fn evidence(&self, words: &FastWords) -> Option<Evidence> {
         let lease = self.proof.watch.run.lease()?;
         let settings = &self.known.settings;
-        let mut evidence = words.state_words().evidence(lease, words.reference());
+        let mut evidence = words.state_words().evidence(lease, words.reference(), self.output(words));
         evidence.word = self.proof.told_word(|held| settings.meaning(held).stands_for(lease));
         if evidence.reference == Told::Yes {
             evidence.reference = self.told_reference(words);
@@ -185,12 +185,17 @@ impl<P: Port> Atv312<P> {
         Some(evidence)
     }
 
+    /// The output, where it is told what a count of it is. Zero is zero by any count.
+    pub(crate) fn output(&self, words: &FastWords) -> Option<Frequency> {
+        let resolution = self.known.resolution.or((words.word(RFR) == 0).then_some(Resolution::Normal));
+        resolution.map(|resolution| words.output(resolution))
+    }
+
     /// What the shaft does, as these words show it.
     pub(crate) fn see_shaft(&mut self, words: &FastWords) {
         let command = self.command();
         let ramps = matches!(self.known.settings.known_stop(), Some(StopMode::Ramp | StopMode::Fast));
-        let resolution = self.known.resolution.or((words.word(RFR) == 0).then_some(Resolution::Normal));
-        let frequency = resolution.map(|resolution| words.output(resolution));
+        let frequency = self.output(words);
         let at = self.registers.snapshot_time();
         let state = words.state_words();
         let (braked, reacted) = (self.proof.watch.shaft.was_braked(), self.proof.has_reacted(state.chart()));

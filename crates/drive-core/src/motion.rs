@@ -19,10 +19,10 @@ pub enum Motion {
     Braking,
     /// It stands, and the drive holds it there by direct current.
     Held,
-    /// The output was cut while it turned, or was found cut when it was first looked at, and nothing tells when it has come to rest.
+    /// The output was cut while it turned, or was not there when it was first looked at, and nothing tells when it has come to rest.
     Coasting,
-    /// The drive brought it down to no output, or was first seen without one that is not cut, or its coast time is over. What it did
-    /// between two looks, or while its line was lost, nobody saw: a motor that was at rest, and that others have run and let coast
+    /// The drive brought it down to no output, or watches the shaft itself and says that it stands, or its coast time is over. What it
+    /// did between two looks, or while its line was lost, nobody saw: a motor that was at rest, and that others have run and let coast
     /// meanwhile, is told to be at rest still.
     AtRest,
     /// The words do not tell.
@@ -89,13 +89,14 @@ pub const INJECTION_AT_MOST: Duration = Duration::from_secs(30);
 /// What was last seen of the shaft, or is to be taken for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Past {
-    /// It was never seen, or was given a run command since. An output that is cut then is no standstill: many a drive shows none while
-    /// it has no supply, and behind a power cycle.
+    /// It was never seen, or may have turned since. No output is no standstill then: a drive whose motor was let coast shows none
+    /// either, nor does one behind a power cycle.
     #[default]
     Unseen,
     /// It stood.
     AtRest,
-    /// It was driven. Of one that was at zero in two statuses behind each other nothing is to be expected when the output goes.
+    /// It was driven; at `zero`: at no output, to which it was seen to come down. Of one that was so in two statuses behind each other
+    /// nothing is to be expected when the output goes.
     Driven { zero: bool, still: bool },
     /// It was braked.
     Braked { still: bool },
@@ -103,7 +104,7 @@ enum Past {
     Coasts(Instant),
 }
 
-/// How fast an output comes down that is braked.
+/// How fast an output comes down.
 #[derive(Debug, Clone, Copy, Default)]
 struct Descent {
     last: Option<(Instant, u32)>,
@@ -113,11 +114,12 @@ struct Descent {
 
 impl Descent {
     fn see(&mut self, now: Instant, output: u32) {
-        if let Some((then, before)) = self.last
-            && output < before
-            && now > then
-        {
-            self.rate = Some((before - output, now - then));
+        if let Some((then, before)) = self.last {
+            if output > before {
+                self.rate = None;
+            } else if output < before && now > then {
+                self.rate = Some((before - output, now - then));
+            }
         }
         self.last = Some((now, output));
     }
@@ -204,8 +206,9 @@ impl Shaft {
         self.was_lost = true;
     }
 
-    /// A motor that was seen at rest may have turned since: without an output that was seen to come down, it may coast.
-    pub(crate) fn may_turn(&mut self) {
+    /// A motor that was seen at rest may have turned since, by what was seen of it besides a status, or not seen at all: without an
+    /// output that was seen to come down, it may coast.
+    pub fn may_turn(&mut self) {
         if self.past == Past::AtRest {
             self.past = Past::Unseen;
         }
@@ -221,7 +224,7 @@ impl Shaft {
     pub fn see(&mut self, at: Instant, shown: Output, frequency: Option<Frequency>) -> Motion {
         let turns = frequency.is_some_and(|frequency| frequency != Frequency::ZERO);
         let was_lost = std::mem::take(&mut self.was_lost);
-        let descent = std::mem::take(&mut self.descent);
+        let mut descent = std::mem::take(&mut self.descent);
         let is_cut = was_lost || self.was_braked() && descent.is_cut(at);
         let shown = match shown {
             Output::Tripped => Output::Cut,
@@ -235,16 +238,22 @@ impl Shaft {
         }
         match shown {
             Output::NotKnown => Motion::NotKnown,
+            Output::Driven if frequency == Some(Frequency::ZERO) => {
+                self.past = self.at_zero(at, descent, was_lost);
+                Motion::Driven
+            }
             Output::Driven => {
-                let zero = frequency == Some(Frequency::ZERO);
-                let still = zero && matches!(self.past, Past::Driven { zero: true, .. });
-                self.past = Past::Driven { zero, still };
+                if !matches!(self.past, Past::Driven { .. }) {
+                    descent = Descent::default();
+                }
+                if let Some(frequency) = frequency {
+                    descent.see(at, frequency.centihertz());
+                }
+                (self.past, self.descent) = (Past::Driven { zero: false, still: false }, descent);
                 Motion::Driven
             }
             Output::Braking(output) => {
-                self.past = Past::Braked { still: output == Frequency::ZERO };
-                self.descent = descent;
-                self.descent.see(at, output.centihertz());
+                self.brake(at, output, descent);
                 Motion::Braking
             }
             Output::Stands if !turns => {
@@ -261,14 +270,44 @@ impl Shaft {
                 Motion::Held
             }
             Output::None | Output::Gone | Output::Cut | Output::Tripped | Output::Stands if turns => {
-                // It tells an output all the same: it comes down.
-                self.past = Past::Braked { still: false };
+                // It tells an output all the same: it comes down. Where it was not seen to before, its words are of two moments, and
+                // the output may have been cut between them.
+                match frequency.filter(|_| self.was_braked()) {
+                    Some(output) => self.brake(at, output, descent),
+                    None => self.past = Past::Driven { zero: false, still: false },
+                }
                 Motion::Braking
             }
             Output::None | Output::Gone | Output::Cut | Output::Tripped | Output::Stands => {
                 self.without_output(at, shown == Output::Cut)
             }
         }
+    }
+
+    fn brake(&mut self, at: Instant, output: Frequency, before: Descent) {
+        self.descent = if self.was_braked() { before } else { Descent::default() };
+        self.descent.see(at, output.centihertz());
+        self.past = Past::Braked { still: output == Frequency::ZERO };
+    }
+
+    /// A run command acts, at no output. It stands where it stood, or was seen to come down so far; else it may coast below a run
+    /// command that was given to it since, as after a stop of one moment.
+    fn at_zero(&self, at: Instant, descent: Descent, was_lost: bool) -> Past {
+        let came_down = !was_lost && descent.rate.is_some() && !descent.is_cut(at);
+        match self.past {
+            Past::Driven { zero: true, .. } if !was_lost => Past::Driven { zero: true, still: true },
+            Past::AtRest | Past::Braked { still: true } => Past::Driven { zero: true, still: false },
+            Past::Driven { .. } | Past::Braked { .. } if came_down => {
+                Past::Driven { zero: true, still: false }
+            }
+            Past::Coasts(since) if self.has_coasted(at, since) => Past::Driven { zero: true, still: false },
+            coasts @ Past::Coasts(_) => coasts,
+            _ => Past::Coasts(at),
+        }
+    }
+
+    fn has_coasted(&self, at: Instant, since: Instant) -> bool {
+        self.coast_time.is_some_and(|time| at.saturating_duration_since(since) >= time)
     }
 
     fn is_injected_for_long(&self, at: Instant, since: Instant) -> bool {
@@ -287,13 +326,9 @@ impl Shaft {
     fn without_output(&mut self, at: Instant, cut: bool) -> Motion {
         self.past = match self.past {
             // Whoever was driven and is without an output was not seen to be brought down: a ramp, or a cut between two looks.
-            Past::Driven { still: false, .. } => Past::Coasts(at),
-            Past::Unseen | Past::Braked { still: false } if cut => Past::Coasts(at),
-            coasts @ Past::Coasts(since)
-                if self.coast_time.is_none_or(|time| at.saturating_duration_since(since) < time) =>
-            {
-                coasts
-            }
+            Past::Unseen | Past::Driven { still: false, .. } => Past::Coasts(at),
+            Past::Braked { still: false } if cut => Past::Coasts(at),
+            coasts @ Past::Coasts(since) if !self.has_coasted(at, since) => coasts,
             _ => Past::AtRest,
         };
         if self.past == Past::AtRest { Motion::AtRest } else { Motion::Coasting }
@@ -306,10 +341,17 @@ mod tests {
 
     const FIFTY: Option<Frequency> = Some(Frequency::from_hertz(50));
 
+    /// One that the drive itself has said to stand.
+    fn resting(at: Instant) -> Shaft {
+        let mut shaft = Shaft::new();
+        assert_eq!(shaft.see(at, Output::Stands, Some(Frequency::ZERO)), Motion::AtRest);
+        shaft
+    }
+
     #[tokio::test(start_paused = true)]
     async fn an_output_that_was_cut_leaves_a_shaft_that_coasts_until_its_owner_says_it_rests() {
-        let (mut shaft, begun) = (Shaft::new(), Instant::now());
-        let after = |seconds| begun + Duration::from_secs(seconds);
+        let begun = Instant::now();
+        let (mut shaft, after) = (resting(begun), |seconds| begun + Duration::from_secs(seconds));
         assert_eq!(shaft.see(begun, Output::None, None), Motion::AtRest);
         assert_eq!(shaft.see(after(1), Output::Driven, FIFTY), Motion::Driven);
         assert_eq!(shaft.see(after(2), Output::Cut, Some(Frequency::ZERO)), Motion::Coasting);
@@ -326,15 +368,74 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_motor_that_was_never_seen_may_coast_where_its_output_is_cut() {
+    async fn a_motor_that_was_never_seen_may_coast_whatever_became_of_its_output() {
         let now = Instant::now();
-        let first = |shown| Shaft::new().see(now, shown, Some(Frequency::ZERO));
-        assert_eq!(first(Output::Cut), Motion::Coasting);
-        assert_eq!(first(Output::Tripped), Motion::Coasting);
-        assert_eq!(first(Output::None), Motion::AtRest, "a ramp has ended");
-        let mut shaft = Shaft::new();
-        shaft.see(now, Output::None, Some(Frequency::ZERO));
-        assert_eq!(shaft.see(now, Output::Cut, Some(Frequency::ZERO)), Motion::AtRest, "it stood");
+        for shown in [Output::None, Output::Gone, Output::Cut, Output::Tripped] {
+            let mut shaft = Shaft::new();
+            shaft.set_coast_time(Some(Duration::from_secs(20)));
+            assert_eq!(shaft.see(now, shown, Some(Frequency::ZERO)), Motion::Coasting, "{shown:?}");
+            let later = now + Duration::from_secs(20);
+            assert_eq!(shaft.see(later, shown, Some(Frequency::ZERO)), Motion::AtRest, "{shown:?}");
+        }
+        assert_eq!(resting(now).see(now, Output::Cut, Some(Frequency::ZERO)), Motion::AtRest, "it stood");
+    }
+
+    /// The words of one status are of two moments where it takes two exchanges. A 3G3EV and an Altivar 28 lost their supply between
+    /// them, with the output of the moment before.
+    #[tokio::test(start_paused = true)]
+    async fn an_output_that_was_cut_amid_the_words_of_one_status_was_not_seen_to_come_down() {
+        let now = Instant::now();
+        for gone in [Output::None, Output::Cut] {
+            let mut shaft = Shaft::new();
+            shaft.see(now, Output::Driven, FIFTY);
+            assert_eq!(
+                shaft.see(now, Output::Cut, FIFTY),
+                Motion::Braking,
+                "it tells an output all the same"
+            );
+            assert!(!shaft.was_braked());
+            assert_eq!(shaft.see(now, gone, Some(Frequency::ZERO)), Motion::Coasting);
+        }
+        // The last moment of a ramp.
+        let (mut shaft, after) = (Shaft::new(), |tenths: u64| now + Duration::from_millis(100 * tenths));
+        for (at, hertz) in [(0, 3), (1, 2)] {
+            shaft.see(
+                after(at),
+                Output::Braking(Frequency::from_hertz(hertz)),
+                Some(Frequency::from_hertz(hertz)),
+            );
+        }
+        assert_eq!(shaft.see(after(2), Output::Cut, Some(Frequency::from_hertz(1))), Motion::Braking);
+        assert_eq!(shaft.see(after(3), Output::None, Some(Frequency::ZERO)), Motion::AtRest);
+    }
+
+    /// An Altivar 58 was let coast, and its panel took it and commanded nothing, between two looks.
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_is_driven_at_no_output_stands_only_where_it_was_seen_to_come_down_or_its_coast_time_is_over()
+     {
+        let begun = Instant::now();
+        let after = |seconds| begun + Duration::from_secs(seconds);
+        let mut cut = Shaft::new();
+        cut.see(begun, Output::Driven, FIFTY);
+        let mut lowered = cut;
+        for at in [1, 2, 3] {
+            assert_eq!(cut.see(after(at), Output::Driven, Some(Frequency::ZERO)), Motion::Driven);
+        }
+        let mut later = cut;
+        assert_eq!(cut.see(after(4), Output::Cut, Some(Frequency::ZERO)), Motion::Coasting);
+        later.set_coast_time(Some(Duration::from_secs(9)));
+        for at in [10, 11] {
+            later.see(after(at), Output::Driven, Some(Frequency::ZERO));
+        }
+        assert_eq!(later.see(after(12), Output::Cut, Some(Frequency::ZERO)), Motion::AtRest);
+        // 10 Hz a second.
+        for at in 1..5_u16 {
+            lowered.see(after(at.into()), Output::Driven, Some(Frequency::from_hertz(50 - 10 * at)));
+        }
+        for at in [5, 6] {
+            lowered.see(after(at), Output::Driven, Some(Frequency::ZERO));
+        }
+        assert_eq!(lowered.see(after(7), Output::Cut, Some(Frequency::ZERO)), Motion::AtRest);
     }
 
     #[tokio::test(start_paused = true)]
@@ -381,9 +482,8 @@ mod tests {
             let later = begun + Duration::from_millis(400);
             assert_eq!(shaft.see(later, shown, Some(Frequency::ZERO)), motion, "{shown:?}");
         }
-        let (mut resting, now) = (Shaft::new(), Instant::now());
-        resting.see(now, Output::None, Some(Frequency::ZERO));
-        assert_eq!(resting.see(now, Output::Gone, Some(Frequency::ZERO)), Motion::AtRest);
+        let now = Instant::now();
+        assert_eq!(resting(now).see(now, Output::Gone, Some(Frequency::ZERO)), Motion::AtRest);
     }
 
     #[tokio::test(start_paused = true)]
@@ -393,8 +493,7 @@ mod tests {
         shaft.lose_sight();
         assert_eq!(shaft.see(now, Output::None, Some(Frequency::ZERO)), Motion::Coasting);
         // One that stood is not set in motion by a lost line.
-        let mut resting = Shaft::new();
-        resting.see(now, Output::None, Some(Frequency::ZERO));
+        let mut resting = resting(now);
         resting.lose_sight();
         assert_eq!(resting.see(now, Output::None, Some(Frequency::ZERO)), Motion::AtRest);
     }
@@ -432,15 +531,14 @@ mod tests {
         assert_eq!(shaft.see(begun, Output::Injection, Some(Frequency::ZERO)), Motion::Braking);
         let late = begun + Duration::from_secs(2);
         assert_eq!(shaft.see(late, Output::Injection, Some(Frequency::ZERO)), Motion::Held);
-        let mut resting = Shaft::new();
-        resting.see(begun, Output::None, Some(Frequency::ZERO));
+        let mut resting = resting(begun);
         assert_eq!(resting.see(begun, Output::Injection, Some(Frequency::ZERO)), Motion::Held);
     }
 
     #[tokio::test(start_paused = true)]
     async fn a_motor_whose_output_was_cut_as_it_began_to_turn_may_coast_and_one_at_zero_speed_stands() {
-        let (mut shaft, now) = (Shaft::new(), Instant::now());
-        shaft.see(now, Output::None, Some(Frequency::ZERO));
+        let now = Instant::now();
+        let mut shaft = resting(now);
         shaft.see(now, Output::Driven, Some(Frequency::ZERO));
         let mut at_zero = shaft;
         assert_eq!(shaft.see(now, Output::Cut, Some(Frequency::ZERO)), Motion::Coasting);

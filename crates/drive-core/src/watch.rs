@@ -171,7 +171,7 @@ mod tests {
     async fn a_motor_that_was_given_a_run_command_and_has_tripped_by_the_next_look_may_coast() {
         let (now, zero) = (Instant::now(), Some(Frequency::ZERO));
         let mut watch = Watch::default();
-        assert_eq!(watch.see(now, Output::None, zero), Motion::AtRest);
+        assert_eq!(watch.see(now, Output::Stands, zero), Motion::AtRest);
         assert_eq!(
             watch.see(now, Output::Tripped, zero),
             Motion::AtRest,

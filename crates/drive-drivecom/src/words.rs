@@ -384,10 +384,10 @@ impl StatusWords {
         }
     }
 
-    /// What these words say of a run command of this side, with `frh`, the reference before the ramp. Whether the word stands,
-    /// and whether that reference is the bus's, is the family's to add.
+    /// What these words say of a run command of this side, with `frh`, the reference before the ramp, and the output behind it.
+    /// Whether the word stands, and whether that reference is the bus's, is the family's to add.
     #[must_use]
-    pub fn evidence(self, lease: Lease, frh: Frequency) -> Evidence {
+    pub fn evidence(self, lease: Lease, frh: Frequency, output: Option<Frequency>) -> Evidence {
         const SIGN: Refusal = Refusal::Overridden {
             by: "the sign of the reference, which another master has turned round,",
             remedy: "stop the motor, and give a setpoint",
@@ -398,7 +398,7 @@ impl StatusWords {
         Evidence {
             word: RunWord::NotTold,
             command: Told::unless(command),
-            output: self.told_output(frh),
+            output: if self.is_brought_down(frh, output) { Told::NotTold } else { self.told_output(frh) },
             reference: Told::unless(turned.then_some(SIGN)),
         }
     }
@@ -430,12 +430,28 @@ impl StatusWords {
         })
     }
 
+    /// Whether the motor slows down although the reference asks for more than its output: by a stop that these words do not name, as
+    /// behind a panel that has given control back, or before it speeds up again. In current limitation a drive lowers its output and
+    /// obeys all the same.
+    fn is_brought_down(self, reference: Frequency, output: Option<Frequency>) -> bool {
+        self.is_turning()
+            && self.eti.contains(ExtendedStatus::DECELERATING)
+            && !self.eti.contains(ExtendedStatus::CURRENT_LIMIT)
+            && self.eta.direction() == self.asks_for()
+            && output.is_some_and(|output| output < reference)
+    }
+
     /// How a run command in this direction shows, the bus being the source of the reference too. A reference of zero asks
     /// for no direction.
     #[must_use]
-    pub fn shows_run(self, direction: Direction, reference: Frequency) -> RunShown {
+    pub fn shows_run(
+        self,
+        direction: Direction,
+        reference: Frequency,
+        output: Option<Frequency>,
+    ) -> RunShown {
         let enabled = self.control() == Control::Bus && self.chart() == Some(ChartState::OperationEnabled);
-        if !enabled || self.is_stopping() {
+        if !enabled || self.is_stopping() || self.is_brought_down(reference, output) {
             RunShown::NotYet
         } else if reference == Frequency::ZERO {
             RunShown::InForce
@@ -588,14 +604,39 @@ mod tests {
     #[test]
     fn a_run_command_shows_in_the_direction_of_the_motor_and_not_of_the_reference_alone() {
         let fifty = Frequency::from_hertz(50);
-        let shown = |eta, eti| StatusWords::new(eta, eti).shows_run(Direction::Reverse, fifty);
+        let shown = |eta, eti| StatusWords::new(eta, eti).shows_run(Direction::Reverse, fifty, None);
         assert_eq!(shown(0x0227, 0xC410), RunShown::TurningRound, "forward, slowing down");
         assert_eq!(shown(0x8227, 0xC210), RunShown::InForce);
         assert_eq!(shown(0x8227, 0x4210), RunShown::NotYet, "the reference asks for forward");
         assert_eq!(shown(0x0227, 0xC000), RunShown::NotYet, "the motor stands");
         assert_eq!(shown(0x8227, 0x8210), RunShown::NotYet, "the terminals command");
-        let stands = StatusWords::new(0x0627, 0x4002).shows_run(Direction::Reverse, Frequency::ZERO);
+        let stands = StatusWords::new(0x0627, 0x4002).shows_run(Direction::Reverse, Frequency::ZERO, None);
         assert_eq!(stands, RunShown::InForce, "at a reference of zero");
+    }
+
+    /// Behind a panel that has taken and given back control the run command stands, is the bus's, and so is the reference, while the
+    /// motor is on its way to standstill (ETI bit 10, p. 22).
+    #[test]
+    fn a_motor_that_slows_down_below_its_reference_is_not_shown_to_obey_it() {
+        let lease = Lease::new(Direction::Forward, 0x000F);
+        let thirty = Frequency::from_hertz(30);
+        for (eti, output, is_told) in [
+            (0x4452, Frequency::from_centihertz(40), false),
+            (0x4452, Frequency::from_hertz(40), true),
+            (0x4452, thirty, true),
+            (0x4252, Frequency::from_centihertz(40), true),
+            (0x4C52, Frequency::from_hertz(20), true),
+        ] {
+            let words = StatusWords::new(0x0227, eti);
+            let told = words.evidence(lease, thirty, Some(output)).output;
+            assert_eq!(told, if is_told { Told::Yes } else { Told::NotTold }, "{eti:04X}h at {output}");
+            let shown = words.shows_run(Direction::Forward, thirty, Some(output));
+            assert_eq!(shown == RunShown::InForce, is_told, "{eti:04X}h at {output}");
+        }
+        // Turning round: it comes down first.
+        let round = StatusWords::new(0x8227, 0x4452);
+        let shown = round.shows_run(Direction::Forward, thirty, Some(Frequency::from_hertz(9)));
+        assert_eq!(shown, RunShown::TurningRound);
     }
 
     #[test]

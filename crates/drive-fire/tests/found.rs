@@ -56,6 +56,13 @@ fn no_cell_that_was_a_find_is_one_again() {
         ("W:161341", "the same"),
         ("F:1614781", "the same by 0Bh"),
         ("A:85936002", "the same of a 58"),
+        ("A:63342000", "a 21 that a refused start saw running had tripped by the next status: told at rest"),
+        ("A:183655244", "a 3G3EV that lost its supply between the two exchanges of a status: told at rest"),
+        ("A:183523431", "the same of a 28"),
+        (
+            "A:134574732",
+            "a 58 that was let coast, and taken by its panel at a setpoint of zero: told at rest",
+        ),
         (
             "W:177444",
             "a start that was confirmed, and says that this was four seconds ago: the matrix was wrong",

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use drive_atv21::{Atv21, CAPABILITIES, ROWS};
 use drive_core::{
-    Direction, Drive, Error, ErrorKind, Frequency, Ground, Lack, Lease, Motion, Reaction, Recognised,
-    Refusal, Result, Row, State, StopMode, Verdict, Withdrawn,
+    Control, Direction, Drive, Error, ErrorKind, Frequency, Ground, Lack, Lease, Motion, Reaction,
+    Recognised, Refusal, Result, Row, State, StopMode, Verdict, Withdrawn,
 };
 use drive_sim::{Panel, SimSlave, models::atv21::Atv21 as Model};
 use drive_testing::{bench, words::Words};
@@ -311,6 +311,22 @@ async fn a_freewheel_stop_leaves_a_shaft_that_coasts_and_a_ramp_one_at_rest() {
     rig.until(|seen| !seen.running).await;
     assert_eq!(drive.status().await.unwrap().motion, Motion::AtRest);
     assert_eq!(rig.machine.observe().shaft_frequency, 0);
+}
+
+/// A start that is refused because the panel runs the motor has seen that it does, in its own reading.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_a_refused_start_saw_running_and_that_has_tripped_by_the_next_status_may_coast() {
+    let (rig, mut drive) = Rig::factory();
+    rig.at_speed(&mut drive).await;
+    rig.at_rest(&mut drive).await;
+    assert_eq!(drive.status().await.unwrap().motion, Motion::AtRest);
+    rig.machine.panel(Panel::TakeControl);
+    rig.machine.panel(Panel::Reference(HALF_SPEED));
+    rig.machine.panel(Panel::Run);
+    rig.until(|seen| seen.shaft_frequency > 1_000).await;
+    assert_eq!(refusal(drive.start(Direction::Forward).await), Refusal::NotInControl(Control::Panel));
+    rig.machine.trip(14);
+    assert_eq!(drive.status().await.unwrap().motion, Motion::Coasting);
 }
 
 #[tokio::test(start_paused = true)]
