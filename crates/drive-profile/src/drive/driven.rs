@@ -106,7 +106,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
 
     /// A reading, and nothing else.
     async fn keep_alive(&mut self) -> Result<()> {
-        let Some(block) = self.fast.first().copied() else { return Ok(()) };
+        let Some(block) = self.sight.fast.first().copied() else { return Ok(()) };
         self.read_block(Class::KeepAlive, block).await.map(drop)
     }
 
