@@ -119,6 +119,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
         let commands: Vec<u16> = file
             .actions()
             .flat_map(|(_, action)| file.writes(action.get_ref()))
+            .filter(|written| written.space == row.space)
             .map(|written| written.address)
             .collect();
         refuse_commands(row, &commands)?;

@@ -1,9 +1,8 @@
 //! Reading, and what the words say of the state, the shaft and the run command of this side.
 
 use drive_core::{
-    Class, Control, Current, Evidence, Exchange, Fault, Faults, Frequency, Measurements, Output, Port,
-    RawWord, Refusal, Result, RunWord, Speed, State, Status, Told, Voltage,
-    tokio_modbus::{Request, Response},
+    Class, Control, Current, Evidence, Fault, Faults, Frequency, Measurements, Output, Port, RawWord,
+    Refusal, Result, Row, RunWord, Speed, State, Status, Told, Voltage, registers::Place,
 };
 use tokio::time::Instant;
 
@@ -14,7 +13,7 @@ use super::{
     sight::{FullScale, Test},
 };
 use crate::{
-    format::{Answer, Proves, Space, UnitName},
+    format::{Answer, Proves, UnitName},
     scale::hundredths,
 };
 
@@ -39,25 +38,7 @@ impl<P: Port> ProfileDrive<P> {
     /// The words, or bits as 0 and 1, of one exchange.
     pub(super) async fn read_block(&mut self, class: Class, block: Block) -> Result<Vec<u16>> {
         let Block { space, first, count } = block;
-        let mut calls = self.registers.at(class);
-        let exchange = Exchange { function: space.read_by(), register: Some(first) };
-        let request = match space {
-            Space::HoldingRegister => return calls.read_words(first, count).await,
-            Space::InputRegister => Request::ReadInputRegisters(first, count),
-            Space::Coil => Request::ReadCoils(first, count),
-            Space::DiscreteInput => Request::ReadDiscreteInputs(first, count),
-        };
-        let read = match calls.request(request, exchange).await? {
-            Response::ReadInputRegisters(words) => words,
-            Response::ReadCoils(bits) | Response::ReadDiscreteInputs(bits) => {
-                bits.into_iter().take(count.into()).map(u16::from).collect()
-            }
-            _ => return Err(calls.answer(exchange, "the answer is of another function")),
-        };
-        if read.len() != usize::from(count) {
-            return Err(calls.answer(exchange, "the answer holds another number of registers"));
-        }
-        Ok(read)
+        self.registers.at(class).read_places(Place { space, address: first }, count).await
     }
 
     pub(super) async fn read_blocks(&mut self, class: Class, blocks: &[Block]) -> Result<Words> {
@@ -196,18 +177,13 @@ impl<P: Port> ProfileDrive<P> {
 
     fn raw(&self, words: &Words) -> Vec<RawWord> {
         let rows = self.registers.capabilities().rows;
-        let code = |space, address| match space {
-            Space::HoldingRegister => {
-                let row = rows.binary_search_by_key(&address, |row| row.address).ok();
-                row.and_then(|at| rows.get(at)).map_or("", |row| row.code)
-            }
-            Space::InputRegister => "InputRegister",
-            Space::Coil => "Coil",
-            Space::DiscreteInput => "DiscreteInput",
+        let code = |place: Place| {
+            let row = rows.binary_search_by_key(&place, Row::place).ok();
+            row.and_then(|at| rows.get(at)).map_or("", |row| row.code)
         };
         words
             .iter()
-            .map(|(space, address, value)| RawWord { address, code: code(space, address), value })
+            .map(|(space, address, value)| RawWord { address, code: code(Place { space, address }), value })
             .collect()
     }
 
