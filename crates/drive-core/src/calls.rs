@@ -15,7 +15,7 @@ use crate::{
     identity::Identity,
     kept_readings::KeptReadings,
     port::{Class, Effect, Port, PortError, Terms},
-    registers::{Register, Row, Written},
+    registers::{Place, Register, Row, Written},
     setpoint::Command,
     status::{RawWord, Status},
 };
@@ -316,7 +316,7 @@ impl<P: Port> Calls<'_, P> {
         // A reading that fails, or is not even sent any more, leaves the outcome unknown.
         if error.kind() == ErrorKind::OutcomeUnknown
             && seen
-            && self.read_back(register.address(), value, &error).await == Ok(value)
+            && self.read_back(register.address().into(), value, &error).await == Ok(value)
         {
             return Ok(());
         }
@@ -325,13 +325,13 @@ impl<P: Port> Calls<'_, P> {
 
     /// What a register holds after a write of which nobody knows what became: read once, or for a while where the drive
     /// has said that it takes long.
-    async fn read_back(&mut self, address: u16, value: u16, error: &Error) -> Result<u16> {
+    async fn read_back(&mut self, place: Place, value: u16, error: &Error) -> Result<u16> {
         let takes_long = matches!(error, Error::Exception { meaning: ExceptionMeaning::Accepted, .. });
         // The write has gone: whoever reads it back does not die of the order's lifetime.
         self.terms.lifetime = None;
         let mut confirming = Confirming::within(PATIENCE);
         loop {
-            let held = self.read_word(address).await?;
+            let held = self.read_place(place).await?;
             if held == value || !takes_long || !confirming.again().await {
                 return Ok(held);
             }
@@ -340,7 +340,7 @@ impl<P: Port> Calls<'_, P> {
 
     /// Writes one word at an address; the confirmation must echo it.
     pub async fn write_word(&mut self, address: u16, value: u16) -> Result<()> {
-        if !self.has_single_write() {
+        if !self.has(0x06) {
             return self.write_words(address, &[value]).await;
         }
         let exchange = Self::writing(address, 0x06);
@@ -375,7 +375,7 @@ impl<P: Port> Calls<'_, P> {
         if !row.access.is_readable() {
             return Err(self.access_forbidden(row));
         }
-        self.read_word(row.address).await
+        self.read_place(row.place()).await
     }
 
     /// Writes the register of a row, if its access and range allow it.
@@ -384,7 +384,7 @@ impl<P: Port> Calls<'_, P> {
     /// Also [`Error::AccessForbidden`] and [`Error::ValueNotAllowed`]; nothing is sent then.
     pub async fn write_row(&mut self, row: &Row, word: u16) -> Result<()> {
         self.check_row(row, word)?;
-        self.write_word(row.address, word).await
+        self.write_place(row.place(), word).await
     }
 
     /// Writes the register of a row as a parameter: reads it first, leaves an equal value alone, and reads back what it
@@ -399,7 +399,7 @@ impl<P: Port> Calls<'_, P> {
         if row.access.is_readable() && self.read_row(row).await? == word {
             return Ok(Written { changed: false, storage: row.storage });
         }
-        let outcome = self.write_word(row.address, word).await;
+        let outcome = self.write_place(row.place(), word).await;
         let written = Written { changed: true, storage: row.storage };
         if !row.access.is_readable() {
             return outcome.map(|()| written);
@@ -408,7 +408,7 @@ impl<P: Port> Calls<'_, P> {
             Ok(()) => self.read_row(row).await,
             // Whether an ambiguous write arrived, the reading tells.
             Err(error) if error.kind() == ErrorKind::OutcomeUnknown => {
-                self.read_back(row.address, word, error).await
+                self.read_back(row.place(), word, error).await
             }
             Err(error) => return Err(error.clone()),
         };
@@ -561,8 +561,8 @@ impl<P: Port> Calls<'_, P> {
         Ok(())
     }
 
-    fn has_single_write(&self) -> bool {
-        self.registers.capabilities.functions.contains(&0x06)
+    pub(crate) fn has(&self, function: u8) -> bool {
+        self.registers.capabilities.functions.contains(&function)
     }
 
     const fn reading(register: u16) -> Exchange {

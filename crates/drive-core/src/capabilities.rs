@@ -183,7 +183,7 @@ impl Capabilities {
     #[must_use]
     pub fn scaled_by(&self, address: u16) -> Option<&'static Row> {
         let scaled = self.scaled.iter().find(|scaled| scaled.registers.contains(&address))?;
-        self.rows.iter().find(|row| row.address == scaled.by)
+        self.rows.iter().find(|row| row.place() == scaled.by.into())
     }
 
     /// A row with the unit that it has where the register that chooses it holds what `held` says; as it stands in the map
@@ -201,8 +201,9 @@ impl Capabilities {
     /// How many words a read of `count` words from `first` on may take along at its end.
     #[must_use]
     pub fn spare_words(&self, first: u16, count: u16) -> u8 {
-        let is_readable =
-            |address: u16| self.rows.iter().any(|row| row.address == address && row.access.is_readable());
+        let is_readable = |address: u16| {
+            self.rows.iter().any(|row| row.place() == address.into() && row.access.is_readable())
+        };
         let behind =
             (1..=self.read_words.saturating_sub(count)).take(usize::from(u8::MAX)).take_while(|more| {
                 first.checked_add(count - 1).and_then(|last| last.checked_add(*more)).is_some_and(is_readable)

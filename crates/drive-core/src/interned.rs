@@ -81,13 +81,14 @@ mod tests {
     use crate::{
         Capabilities, Row,
         access::Access,
-        registers::{Choice, Confidence, Factory, Range, Storage, Unit},
+        registers::{Choice, Confidence, Factory, Range, Space, Storage, Unit},
     };
 
     /// A family's tables as somebody's file says them.
     fn read(meaning: &str) -> &'static Capabilities {
         let choices = list(&[Choice::new(1, text("on"), text(meaning))]);
         let row = Row {
+            space: Space::HoldingRegister,
             address: 9,
             code: text(&format!("{}FR", "C")),
             name: text("fan command"),

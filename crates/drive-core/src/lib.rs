@@ -32,6 +32,7 @@ mod lease;
 mod motion;
 mod named;
 mod own_run;
+mod places;
 pub mod port;
 mod quantity;
 mod reconnecting;

@@ -110,7 +110,7 @@ mod tests {
                     continue;
                 }
                 named += 1;
-                let row = rows.iter().find(|row| row.address == address);
+                let row = rows.iter().find(|row| row.place() == address.into());
                 assert!(row.is_some_and(|row| row.unit.form == Form::Bits), "{family}: {address}");
                 assert!(bits.is_sorted_by_key(|bit| bit.mask), "{family}: {address}");
             }

@@ -4,7 +4,7 @@ use drive_core::{
     Capabilities, Row,
     access::Access,
     interned,
-    registers::{Confidence, Factory, Range, Storage, Unit},
+    registers::{Confidence, Factory, Range, Space, Storage, Unit},
 };
 use drive_families::{Bit, Definition, Family, OptionEntry, Options};
 
@@ -16,6 +16,7 @@ fn read(file: &str) -> Family {
     let [key, address, bit, highest] = file.split(' ').collect::<Vec<_>>()[..] else { panic!("four words") };
     let (address, highest): (u16, u32) = (address.parse().unwrap(), highest.parse().unwrap());
     let status = Row {
+        space: Space::HoldingRegister,
         address,
         code: interned::text("STA"),
         name: "status",

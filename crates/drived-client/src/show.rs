@@ -178,7 +178,7 @@ pub fn registers(rows: &[ParameterView]) -> Result<(), Failure> {
         // A value that could not be read says why.
         let value = row.text.as_deref().or(row.error.as_deref()).unwrap_or("-");
         table.row([
-            row.address.to_string(),
+            row.place().to_string(),
             row.mnemonic.to_string(),
             value.to_owned(),
             row.name.to_string(),

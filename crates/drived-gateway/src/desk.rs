@@ -193,7 +193,10 @@ impl Desk {
             return Err(ExceptionCode::IllegalFunction);
         }
         let mut unmapped = ask.registers().filter(|address| {
-            !capabilities.rows.iter().any(|row| row.address == *address && row.access.is_readable())
+            let is_it = |row: &drive_core::Row| {
+                row.address == *address && !row.space.is_bit() && row.access.is_readable()
+            };
+            !capabilities.rows.iter().any(is_it)
         });
         if self.config.mapped_only && unmapped.next().is_some() {
             return Err(ExceptionCode::IllegalDataAddress);

@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, fmt};
 
 use drive_core::{
     Capabilities, Control, Frequency, Measurements, Motion, Setpoint, State, Status,
-    registers::{Form, Unit},
+    registers::{Form, Space, Unit},
 };
 use drive_fleet::Snapshot;
 use drived_plant::plant::past::{IsView, PointView};
@@ -272,7 +272,10 @@ impl fmt::Display for Quantity {
 #[must_use]
 pub fn numbers(capabilities: &Capabilities) -> BTreeSet<u16> {
     let is_number = |row: &&drive_core::Row| {
-        row.unit.form == Form::Number && row.unit != Unit::COUNT && row.range.choices().is_empty()
+        row.space == Space::HoldingRegister
+            && row.unit.form == Form::Number
+            && row.unit != Unit::COUNT
+            && row.range.choices().is_empty()
     };
     capabilities.rows.iter().filter(is_number).map(|row| row.address).collect()
 }

@@ -134,13 +134,14 @@ pub fn range(row: &Row) -> String {
 
 #[cfg(test)]
 mod tests {
-    use drive_core::registers::{Access, Choice, Confidence, Storage, Unit};
+    use drive_core::registers::{Access, Choice, Confidence, Space, Storage, Unit};
 
     use super::*;
 
     const YES_NO: &[Choice] = &[Choice::new(0, "nO", "no"), Choice::new(1, "YES", "yes")];
 
     const RAMP: Row = Row {
+        space: Space::HoldingRegister,
         address: 9001,
         code: "ACC",
         name: "acceleration",

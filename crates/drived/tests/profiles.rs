@@ -8,10 +8,10 @@ use std::{
     fs,
     io::{BufRead as _, BufReader},
     path::{Path, PathBuf},
-    process::Stdio,
+    process::{Command, Stdio},
 };
 
-use support::{Ended, File, Running, Sim, drived, path, run};
+use support::{Ended, File, Running, Sim, drived, free_port, path, python_with, run};
 
 /// The shipped profile of the Goodrive under a name of somebody's own.
 const OWN: &str = include_str!("../../drive-profile/profiles/invt/goodrive.toml");
@@ -178,6 +178,109 @@ fn parameters_of_a_drive_from_a_file_are_kept_compared_and_restored() {
     assert!(right(on(&["get", "--drive", "own-drive@3", "P0011"])).contains("3.0 s"));
     sim.kill().expect("it runs");
     sim.wait().expect("it ends");
+    let _ = fs::remove_file(kept);
+}
+
+/// A drive with a coil, an input, an input register and a holding register of one address.
+const SPACES: &str = include_str!("../../drive-profile/tests/data/spaces.toml");
+
+/// Coils and inputs as parameters, over the simulator of the same file, and over a slave of another hand.
+#[test]
+fn a_parameter_is_read_and_written_in_whichever_of_the_four_spaces_it_stands() {
+    let folder = Folder::new("spaces");
+    fs::write(folder.0.join("own.toml"), SPACES).expect("it can be written");
+    let link = path("spaces-line");
+    let link = link.to_str().expect("the path is text");
+    let mut sim = drived(&["sim", "--pty", link, "--drive", "spaces@3", "--baud", "9600", "--format", "8E1"]);
+    serves(sim.env("DRIVED_PROFILES", &folder.0), || {
+        in_four_spaces(&folder, &format!("{link},9600,8E1"), None)
+    });
+    if let Some(python) = python_with("pymodbus") {
+        let port = free_port().to_string();
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/peers/spaces.py");
+        let mut stranger = Command::new(python);
+        // What its coil, its inputs and its register hold from the beginning.
+        let held = ["0 off", "1 on", "325.0 V", "3.0 s"];
+        serves(stranger.args([script, &port]), || {
+            in_four_spaces(&folder, &format!("tcp://127.0.0.1:{port}"), Some(held));
+        });
+    }
+}
+
+/// Runs a server until this is done.
+fn serves(command: &mut Command, then: impl FnOnce()) {
+    let mut server = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
+    let mut said = String::new();
+    BufReader::new(server.stdout.as_mut().expect("it is piped")).read_line(&mut said).expect("it speaks");
+    then();
+    server.kill().expect("it runs");
+    server.wait().expect("it ends");
+}
+
+fn in_four_spaces(folder: &Folder, line: &str, held: Option<[&str; 4]>) {
+    let on = |words: &[&str]| {
+        let words = [&["param"], words, &["--line", line]].concat();
+        let output = drived(&words).env("DRIVED_PROFILES", &folder.0).output().expect("the program runs");
+        let told = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+        (output.status.code(), told.into_owned())
+    };
+    let one = |words: &[&str]| on(&[words, &["--drive", "spaces@3"]].concat());
+    let right = |(code, told): (Option<i32>, String)| {
+        assert_eq!(code, Some(0), "{told}");
+        told
+    };
+    let line_of = |told: &str, code: &str| {
+        let found = told.lines().find(|line| line.contains(code)).unwrap_or_default();
+        found.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let dumped = right(one(&["dump"]));
+    let places = [
+        ("BRAKE", "coil 512 BRAKE"),
+        ("DOOR", "discrete input 512 DOOR"),
+        ("SUPPLY", "input register 512 SUPPLY"),
+        ("ACC", "512 ACC"),
+    ];
+    for (at, (code, place)) in places.into_iter().enumerate() {
+        let told = line_of(&dumped, code);
+        assert!(told.starts_with(place), "{dumped}");
+        assert!(held.is_none_or(|held| told.starts_with(&format!("{place} {}", held[at]))), "{dumped}");
+    }
+    // Each by its name, and each at its address leaves the other there alone.
+    right(one(&["set", "ACC", "4.5"]));
+    right(one(&["set", "BRAKE", "on"]));
+    right(one(&["set", "coil 512", "on"]));
+    let got = |register| line_of(&right(one(&["get", register])), "512");
+    assert!(got("BRAKE").starts_with("coil 512 BRAKE 1 on"), "{}", got("BRAKE"));
+    assert!(got("512").starts_with("512 ACC 4.5 s"), "{}", got("512"));
+    // A bit is nothing but on and off, and nobody writes an input.
+    let refused = |words: &[&str], why: &str| {
+        let (code, told) = one(words);
+        assert!(code != Some(0) && told.contains(why), "{why}: {code:?} {told}");
+    };
+    refused(&["set", "BRAKE", "2"], "expected");
+    refused(&["set", "DOOR", "on"], "can only be read");
+    refused(&["set", "SUPPLY", "3"], "can only be read");
+    // What keeps its value is kept, compared and put back.
+    let kept = path("spaces-kept.toml");
+    let kept = kept.to_str().expect("the path is text");
+    right(on(&["backup", "spaces@3", "--to", kept]));
+    let text = fs::read_to_string(kept).expect("it was written");
+    let is_kept = |code: &str| text.lines().any(|line| line.starts_with(code));
+    assert!(is_kept("BRAKE") && is_kept("ACC") && !is_kept("DOOR") && !is_kept("SUPPLY"), "{text}");
+    assert!(line_of(&text, "BRAKE").contains("space = \"coil\""), "{text}");
+    right(one(&["set", "BRAKE", "off"]));
+    let (code, told) = on(&["diff", kept, "spaces@3"]);
+    assert!(code == Some(1) && told.contains("BRAKE") && !told.contains("ACC"), "{code:?} {told}");
+    right(on(&["restore", kept, "--write"]));
+    assert!(
+        got("BRAKE").starts_with("coil 512 BRAKE 1 on") && got("ACC").contains("4.5 s"),
+        "{}",
+        got("BRAKE")
+    );
+    // A file of a profile in which the name stood elsewhere puts nothing back.
+    fs::write(kept, text.replace("space = \"coil\", ", "")).expect("it can be written");
+    let (code, told) = on(&["restore", kept, "--write"]);
+    assert!(code == Some(2) && told.contains("BRAKE is a coil"), "{code:?} {told}");
     let _ = fs::remove_file(kept);
 }
 

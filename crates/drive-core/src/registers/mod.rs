@@ -53,6 +53,7 @@ mod guard;
 mod relations;
 mod restoring;
 mod row;
+mod space;
 mod unit;
 
 use std::{fmt, marker::PhantomData};
@@ -62,6 +63,7 @@ pub use guard::refuse_commands;
 pub use relations::{Holds, Relation};
 pub use restoring::{Change, Part, Restoring, Scaled, Step, in_order};
 pub use row::{Choice, Confidence, Factory, Range, Row, Storage, Written};
+pub use space::{Place, Space};
 pub use unit::{Form, Unit};
 
 /// A register with its access in its type.
@@ -145,6 +147,7 @@ macro_rules! registers {
                 #[allow(unused_imports)]
                 use $crate::registers::{Factory, Range, Unit};
                 $crate::registers::Register::new(&$crate::registers::Row {
+                    space: $crate::registers::Space::HoldingRegister,
                     address: $address,
                     code: $code,
                     name: $name,

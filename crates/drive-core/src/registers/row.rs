@@ -2,7 +2,10 @@
 
 use std::fmt;
 
-use super::unit::Unit;
+use super::{
+    space::{Place, Space},
+    unit::Unit,
+};
 use crate::access::Access;
 
 /// Where a written value lives, and so what a power cycle and a write cost.
@@ -128,6 +131,8 @@ pub enum Confidence {
 /// One register: everything that is known of it, and from where.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Row {
+    /// The space in which it stands: a holding register of all five families, any in a drive from a file.
+    pub space: Space,
     /// The address on the wire.
     pub address: u16,
     /// The manual's mnemonic.
@@ -176,19 +181,30 @@ impl Row {
         listed.map(|choice| choice.value).or_else(|| self.unit.read(text))
     }
 
-    /// The row whose mnemonic or decimal or hexadecimal address is `text`: `ACC`, `9001`, `W9001`, `2329h` or `0x2329`. A mnemonic
-    /// in other letters is found where no second one differs from it by these alone.
+    /// Where it stands: its address and the space of that.
+    #[must_use]
+    pub const fn place(&self) -> Place {
+        Place { space: self.space, address: self.address }
+    }
+
+    /// The row whose mnemonic or decimal or hexadecimal address is `text`: `ACC`, `9001`, `W9001`, `2329h` or `0x2329`; an address alone
+    /// is that of a holding register, `coil 14`, `discrete input 14` and `input register 14` are the others. A mnemonic in other letters
+    /// is found where no second one differs from it by these alone.
     #[must_use]
     pub fn find(rows: &'static [Self], text: &str) -> Option<&'static Self> {
         let by_code = rows.iter().find(|row| row.code == text);
         by_code.or_else(|| {
+            let at = |place: Place| rows.iter().find(|row| row.place() == place);
+            if let Some(place) = Place::read(text) {
+                return at(place);
+            }
             let hexadecimal = text.strip_prefix("0x").or_else(|| text.strip_suffix(['h', 'H']));
             let address = match hexadecimal {
                 Some(digits) => u16::from_str_radix(digits, 16),
                 None => text.strip_prefix('W').unwrap_or(text).parse(),
             };
             match address {
-                Ok(address) => rows.iter().find(|row| row.address == address),
+                Ok(address) => at(address.into()),
                 Err(_) => {
                     let mut alike = rows.iter().filter(|row| row.code.eq_ignore_ascii_case(text));
                     alike.next().filter(|_| alike.next().is_none())

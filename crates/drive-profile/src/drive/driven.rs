@@ -106,7 +106,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
 
     /// A reading, and nothing else.
     async fn keep_alive(&mut self) -> Result<()> {
-        let Some(block) = self.fast.first().copied() else { return Ok(()) };
+        let Some(block) = self.sight.fast.first().copied() else { return Ok(()) };
         self.read_block(Class::KeepAlive, block).await.map(drop)
     }
 
@@ -119,6 +119,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
         let commands: Vec<u16> = file
             .actions()
             .flat_map(|(_, action)| file.writes(action.get_ref()))
+            .filter(|written| written.space == row.space)
             .map(|written| written.address)
             .collect();
         refuse_commands(row, &commands)?;

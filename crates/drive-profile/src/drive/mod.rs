@@ -1,5 +1,6 @@
 //! The engine: a drive of a profile is a [`Drive`](drive_core::Drive) as those are whose families are written by hand.
 
+mod cell;
 mod command;
 mod driven;
 mod guards;
@@ -7,6 +8,7 @@ mod owner;
 mod plan;
 mod reading;
 mod setpoint;
+mod sight;
 mod tables;
 
 use std::sync::Arc;
@@ -17,7 +19,10 @@ pub use owner::Owner;
 
 use crate::{ladder::Level, profile::Profile};
 use guards::Guarded;
-pub(crate) use plan::{Block, Words, is_double};
+#[cfg(feature = "sim")]
+pub(crate) use plan::Block;
+pub(crate) use plan::{Words, is_double};
+use sight::Sight;
 
 /// Behind every so many statuses the command is read back, while one of this side stands: what it does shows in each.
 const STATUSES_PER_TURN: u16 = 4;
@@ -28,12 +33,7 @@ const STATUSES_PER_TURN: u16 = 4;
 pub struct ProfileDrive<P> {
     registers: Registers<P>,
     profile: Arc<Profile>,
-    fast: Vec<Block>,
-    slow: Vec<Block>,
-    /// What reads the code of the present fault, where no status does.
-    code: Option<Block>,
-    /// What reads the command back, where no status does.
-    command: Option<Block>,
+    sight: Arc<Sight>,
     owner: Owner,
     watch: Watch,
     guarded: Guarded,
@@ -52,15 +52,12 @@ impl<P: Port> ProfileDrive<P> {
     #[must_use]
     pub fn new(port: P, slave: SlaveAddress, profile: Arc<Profile>, owner: Owner) -> Self {
         let registers = Registers::new(port, slave, profile.capabilities(), meaning);
-        let (fast, slow, code, command) = (profile.fast(), profile.slow(), profile.code(), profile.command());
+        let sight = Arc::new(Sight::of(&profile));
         let guarded = Guarded::of(&profile);
         Self {
             registers,
             profile,
-            fast,
-            slow,
-            code,
-            command,
+            sight,
             owner,
             watch: Watch::every(STATUSES_PER_TURN),
             guarded,

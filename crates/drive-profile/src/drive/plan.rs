@@ -4,14 +4,11 @@ use std::collections::BTreeSet;
 
 use crate::format::Spanned;
 
+use super::cell::{Cell, Single};
 use crate::{
-    format::{Access, Answer, Bits, Byte, Order, Register, Space, UnitName},
+    format::{Access, Answer, Bits, Register, Space},
     profile::Profile,
-    scale::hundredths,
 };
-
-/// The most decimals that a register can say another has.
-const DECIMALS: u16 = 6;
 
 /// Registers that one exchange reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,46 +46,26 @@ impl Profile {
         Some((register, space, address))
     }
 
-    /// The word that counts of a register: a byte of it where it is one. Of two words there is none.
-    pub(crate) fn word(&self, words: &Words, name: &str) -> Option<u16> {
+    /// A register by its name, resolved.
+    pub(crate) fn cell(&self, name: &str) -> Option<Cell> {
         let (register, space, address) = self.place_of(name)?;
-        if register.words.as_ref().is_some_and(|words| *words.get_ref() != 1) {
-            return None;
-        }
-        let word = words.at(space, address)?;
-        Some(match register.byte {
-            None => word,
-            Some(Byte::High) => word >> 8,
-            Some(Byte::Low) => word & 0xFF,
+        let decimals = register.decimals_in.as_ref().map(|of| self.place_of(of.get_ref()));
+        // What says how many decimals there are is one word, or nobody knows what a count is worth.
+        let decimals = decimals.map(|of| of.filter(|(register, ..)| !is_double(register)));
+        let scale = register.scale.as_ref().map(|scale| *scale.get_ref());
+        Some(Cell {
+            at: Single { space, address, byte: register.byte },
+            order: register.order.filter(|_| is_double(register)),
+            signed: register.signed,
+            unit: register.unit,
+            scale: scale.filter(|_| !matches!(decimals, Some(None))),
+            decimals: decimals.flatten().map(|(of, space, address)| Single { space, address, byte: of.byte }),
         })
     }
 
-    /// The number of counts that a register holds, of one word or of two.
-    pub(crate) fn counts(&self, words: &Words, name: &str) -> Option<i64> {
-        let (register, space, address) = self.place_of(name)?;
-        if is_double(register) {
-            let pair = [words.at(space, address)?, words.at(space, address.checked_add(1)?)?];
-            let [high, low] = if register.order? == Order::HighFirst { pair } else { [pair[1], pair[0]] };
-            let double = u32::from(high) << 16 | u32::from(low);
-            return Some(if register.signed { double.cast_signed().into() } else { double.into() });
-        }
-        let word = self.word(words, name)?;
-        Some(if register.signed { i64::from(word.cast_signed()) } else { i64::from(word) })
-    }
-
-    /// The value of a register in hundredths of a unit, rounded; `None` where it has another unit, or was not read.
-    pub(crate) fn hundredths(&self, words: &Words, name: &str, unit: UnitName) -> Option<i64> {
-        let register = self.file.named(name).filter(|register| register.unit == unit)?;
-        let [numerator, denominator] = self.scale(words, register)?;
-        Some(hundredths(self.counts(words, name)?, numerator, denominator))
-    }
-
-    /// So many of its unit are one count, as a fraction: also where another register holds how many decimals there are.
-    pub(crate) fn scale(&self, words: &Words, register: &Register) -> Option<[i64; 2]> {
-        let [numerator, denominator] = *register.scale.as_ref()?.get_ref();
-        let Some(decimals) = &register.decimals_in else { return Some([numerator, denominator]) };
-        let decimals = self.word(words, decimals.get_ref()).filter(|decimals| *decimals <= DECIMALS)?;
-        Some([numerator, denominator.checked_mul(10_i64.pow(decimals.into()))?])
+    /// The word that counts of a register: a byte of it where it is one. Of two words there is none.
+    pub(crate) fn word(&self, words: &Words, name: &str) -> Option<u16> {
+        self.cell(name)?.word(words)
     }
 
     /// Whether bits fit; `None`: they were not read.

@@ -1,15 +1,19 @@
 //! Reading, and what the words say of the state, the shaft and the run command of this side.
 
 use drive_core::{
-    Class, Control, Current, Direction, Evidence, Exchange, Fault, Faults, Frequency, Measurements, Output,
-    Port, RawWord, Refusal, Result, RunWord, Speed, State, Status, Told, Voltage,
-    tokio_modbus::{Request, Response},
+    Class, Control, Current, Evidence, Fault, Faults, Frequency, Measurements, Output, Port, RawWord,
+    Refusal, Result, Row, RunWord, Speed, State, Status, Told, Voltage, registers::Place,
 };
 use tokio::time::Instant;
 
-use super::{ProfileDrive, Words, plan::Block};
+use super::{
+    ProfileDrive, Words,
+    cell::Cell,
+    plan::Block,
+    sight::{FullScale, Test},
+};
 use crate::{
-    format::{Answer, Owner as OwnerBits, Proves, Space, StateName, UnitName},
+    format::{Answer, Proves, UnitName},
     scale::hundredths,
 };
 
@@ -34,25 +38,7 @@ impl<P: Port> ProfileDrive<P> {
     /// The words, or bits as 0 and 1, of one exchange.
     pub(super) async fn read_block(&mut self, class: Class, block: Block) -> Result<Vec<u16>> {
         let Block { space, first, count } = block;
-        let mut calls = self.registers.at(class);
-        let exchange = Exchange { function: space.read_by(), register: Some(first) };
-        let request = match space {
-            Space::HoldingRegister => return calls.read_words(first, count).await,
-            Space::InputRegister => Request::ReadInputRegisters(first, count),
-            Space::Coil => Request::ReadCoils(first, count),
-            Space::DiscreteInput => Request::ReadDiscreteInputs(first, count),
-        };
-        let read = match calls.request(request, exchange).await? {
-            Response::ReadInputRegisters(words) => words,
-            Response::ReadCoils(bits) | Response::ReadDiscreteInputs(bits) => {
-                bits.into_iter().take(count.into()).map(u16::from).collect()
-            }
-            _ => return Err(calls.answer(exchange, "the answer is of another function")),
-        };
-        if read.len() != usize::from(count) {
-            return Err(calls.answer(exchange, "the answer holds another number of registers"));
-        }
-        Ok(read)
+        self.registers.at(class).read_places(Place { space, address: first }, count).await
     }
 
     pub(super) async fn read_blocks(&mut self, class: Class, blocks: &[Block]) -> Result<Words> {
@@ -67,18 +53,18 @@ impl<P: Port> ProfileDrive<P> {
 
     /// A status. What it says of the run command ends nothing: see [`judge`](Self::judge).
     pub(super) async fn read_status(&mut self, class: Class) -> Result<(Status, Words)> {
-        let blocks = self.fast.clone();
-        let mut words = self.read_blocks(class, &blocks).await?;
-        if let Some(block) = self.command.filter(|_| self.wants_command(class)) {
+        let sight = self.sight.clone();
+        let mut words = self.read_blocks(class, &sight.fast).await?;
+        if let Some(block) = sight.command.filter(|_| self.wants_command(class)) {
             let read = self.read_block(class, block).await.inspect_err(|_| self.watch.turns.again())?;
             words.keep(block, read);
         }
         let mut status = self.explain(&words);
-        if let Some(block) = self.code.filter(|_| status.is_fault()) {
+        if let Some(block) = sight.code.filter(|_| status.is_fault()) {
             // That it has tripped is told in any case.
             if let Ok(read) = self.read_block(class, block).await {
                 words.keep(block, read);
-                status.fault_code = see_code(&self.profile, &words).filter(|code| *code != 0);
+                status.fault_code = sight.fault_code(&words);
                 status.raw = self.raw(&words);
             }
         }
@@ -108,48 +94,31 @@ impl<P: Port> ProfileDrive<P> {
     }
 
     fn explain(&mut self, words: &Words) -> Status {
-        let profile = self.profile.clone();
-        let (file, see) = (profile.file(), &profile.file().see);
-        let states = file.state.is.iter().map(crate::format::Spanned::get_ref);
-        let mut state = State::Unknown;
-        for is in states {
-            match profile.fits(words, is.bits.get_ref()) {
-                Some(true) => {
-                    state = is.state.state();
-                    break;
-                }
-                Some(false) => {}
-                // What cannot be seen may be a trip: nothing behind it is told.
-                None => break,
-            }
-        }
-        let output_frequency = see.output.given().and_then(|name| self.frequency(words, name.get_ref()));
-        state = self.coming_down(state, output_frequency);
-        let fits =
-            |bits: Option<&crate::format::Spanned<crate::format::Bits>>| profile.fits(words, bits?.get_ref());
-        let code = see_code(&profile, words).filter(|code| *code != 0 && state.is_fault());
-        let control =
-            match self.owned(words, file.ownership.command.given().map(crate::format::Spanned::get_ref)) {
-                Told::Yes => Some(Control::Bus),
-                Told::No(_) => Some(Control::Local),
-                Told::NotTold => None,
-            };
-        let current = see.current.given().and_then(|name| {
-            let hundredths = profile.hundredths(words, name.get_ref(), UnitName::Ampere)?;
-            i32::try_from(hundredths / 10).ok()
+        let sight = self.sight.clone();
+        let output_frequency = sight.output.and_then(|output| self.frequency(words, output));
+        let state = self.coming_down(sight.state(words), output_frequency);
+        let fits = |test: &Option<Test>| test.as_ref()?.fits(words);
+        let control = match owned(words, sight.commanded_by.as_ref()) {
+            Told::Yes => Some(Control::Bus),
+            Told::No(_) => Some(Control::Local),
+            Told::NotTold => None,
+        };
+        let current = sight.current.and_then(|current| {
+            let hundredths = current.hundredths(words, UnitName::Ampere)?;
+            u32::try_from(hundredths / 10).ok()
         });
-        if let Some(held) = self.held(words) {
+        if let Some(held) = sight.held(words) {
             self.watch.run.reads(held);
         }
         Status {
             state,
-            direction: self.direction(words),
+            direction: sight.direction(words),
             output_frequency,
-            current: current.and_then(|tenths| u32::try_from(tenths).ok()).map(Current::from_deciamperes),
-            reference: see.setpoint.given().and_then(|name| self.frequency(words, name.get_ref())),
-            at_reference: fits(see.at_setpoint.given()),
-            warning: fits(see.warning.given()),
-            fault_code: code,
+            current: current.map(Current::from_deciamperes),
+            reference: sight.setpoint.and_then(|setpoint| self.frequency(words, setpoint)),
+            at_reference: fits(&sight.at_setpoint),
+            warning: fits(&sight.warning),
+            fault_code: sight.fault_code(words).filter(|_| state.is_fault()),
             control,
             raw: self.raw(words),
             at: self.registers.snapshot_time(),
@@ -174,18 +143,16 @@ impl<P: Port> ProfileDrive<P> {
     }
 
     /// A register as a frequency, whichever way it turns.
-    pub(super) fn frequency(&self, words: &Words, name: &str) -> Option<Frequency> {
-        let register = self.profile.file().named(name)?;
-        let counts = self.profile.counts(words, name)?;
-        let [numerator, denominator] = self.hertz_of(register, words)?;
-        let centihertz = hundredths(counts, numerator, denominator);
+    pub(super) fn frequency(&self, words: &Words, cell: Cell) -> Option<Frequency> {
+        let [numerator, denominator] = self.hertz_of(words, cell)?;
+        let centihertz = hundredths(cell.counts(words)?, numerator, denominator);
         u32::try_from(centihertz.unsigned_abs()).ok().map(Frequency::from_centihertz)
     }
 
     /// How many hertz are one count of a register, as a fraction.
-    pub(super) fn hertz_of(&self, register: &crate::format::Register, words: &Words) -> Option<[i64; 2]> {
-        let [numerator, denominator] = self.profile.scale(words, register)?;
-        match register.unit {
+    pub(super) fn hertz_of(&self, words: &Words, cell: Cell) -> Option<[i64; 2]> {
+        let [numerator, denominator] = cell.scale(words)?;
+        match cell.unit {
             UnitName::Hertz => Some([numerator, denominator]),
             UnitName::Percent => {
                 let full = i64::from(self.full_scale(words)?.centihertz());
@@ -198,56 +165,32 @@ impl<P: Port> ProfileDrive<P> {
 
     /// What 100 % is: as the drive holds it, or its owner says.
     fn full_scale(&self, words: &Words) -> Option<Frequency> {
-        let full = self.profile.file().setpoint.given()?.get_ref().full_scale.as_ref()?;
-        if full.get_ref() == "owner" {
-            return self.owner.full_scale.filter(|full| *full != Frequency::ZERO);
-        }
-        let held = self.profile.hundredths(words, full.get_ref(), UnitName::Hertz)?;
-        u32::try_from(held).ok().filter(|held| *held != 0).map(Frequency::from_centihertz)
-    }
-
-    fn direction(&self, words: &Words) -> Option<Direction> {
-        let direction = self.profile.file().see.direction.given()?.get_ref();
-        let name = direction.register.get_ref();
-        let Some(mask) = &direction.mask else {
-            return match self.profile.counts(words, name)?.signum() {
-                1 => Some(Direction::Forward),
-                -1 => Some(Direction::Reverse),
-                _ => None,
-            };
+        let full = match self.sight.full_scale.as_ref()? {
+            FullScale::Owner => self.owner.full_scale?,
+            FullScale::Register(cell) => {
+                let held = cell.hundredths(words, UnitName::Hertz)?;
+                Frequency::from_centihertz(u32::try_from(held).ok()?)
+            }
         };
-        let word = Some(self.profile.word(words, name)? & mask.get_ref());
-        if word == direction.forward {
-            Some(Direction::Forward)
-        } else if word == direction.reverse {
-            Some(Direction::Reverse)
-        } else {
-            None
-        }
+        Some(full).filter(|full| *full != Frequency::ZERO)
     }
 
     fn raw(&self, words: &Words) -> Vec<RawWord> {
         let rows = self.registers.capabilities().rows;
-        let code = |space, address| match space {
-            Space::HoldingRegister => {
-                let row = rows.binary_search_by_key(&address, |row| row.address).ok();
-                row.and_then(|at| rows.get(at)).map_or("", |row| row.code)
-            }
-            Space::InputRegister => "InputRegister",
-            Space::Coil => "Coil",
-            Space::DiscreteInput => "DiscreteInput",
+        let code = |place: Place| {
+            let row = rows.binary_search_by_key(&place, Row::place).ok();
+            row.and_then(|at| rows.get(at)).map_or("", |row| row.code)
         };
         words
             .iter()
-            .map(|(space, address, value)| RawWord { address, code: code(space, address), value })
+            .map(|(space, address, value)| RawWord { address, code: code(Place { space, address }), value })
             .collect()
     }
 
     /// What this status shows of the output. Of the shaft it tells only by what its file names for that.
     fn shown(&self, status: &Status, words: &Words) -> Output {
         let output = status.output_frequency;
-        let standstill = self.profile.file().state.standstill.given();
-        let stands = standstill.and_then(|bits| self.profile.fits(words, bits.get_ref())) == Some(true);
+        let stands = self.sight.standstill.as_ref().and_then(|test| test.fits(words)) == Some(true);
         match status.state {
             State::Fault | State::Ready | State::Disabled | State::NotReady if stands => Output::Stands,
             State::Fault => Output::Tripped,
@@ -257,7 +200,9 @@ impl<P: Port> ProfileDrive<P> {
                 None => Output::NotKnown,
             },
             // A drive of which nothing shows that it runs may run in any of these.
-            State::Ready | State::Disabled | State::NotReady if output.is_none() && !self.shows_running() => {
+            State::Ready | State::Disabled | State::NotReady
+                if output.is_none() && !self.sight.shows_running() =>
+            {
                 Output::NotKnown
             }
             State::Ready | State::Disabled | State::NotReady => match output {
@@ -274,43 +219,25 @@ impl<P: Port> ProfileDrive<P> {
         }
     }
 
-    /// Whether a state of its profile is that of a motor that runs.
-    fn shows_running(&self) -> bool {
-        self.profile.file().state.is.iter().any(|is| is.get_ref().state == StateName::Running)
-    }
-
-    /// The command that the drive is read to hold.
-    fn held(&self, words: &Words) -> Option<u16> {
-        let read = self.profile.file().ownership.reads_back.given()?;
-        self.profile.word(words, read.get_ref().register.get_ref())
-    }
-
     /// The setpoint as the drive shows it, in hundredths of a hertz, or in counts where they cannot be told so.
     pub(super) fn setpoint_seen(&self, words: &Words) -> Option<i64> {
-        let name = self.profile.file().see.setpoint.given()?.get_ref();
-        match self.frequency(words, name) {
+        let setpoint = self.sight.setpoint?;
+        match self.frequency(words, setpoint) {
             Some(frequency) => Some(i64::from(frequency.centihertz())),
-            None => self.profile.counts(words, name),
+            None => setpoint.counts(words),
         }
     }
 
-    pub(super) fn owned(&self, words: &Words, owner: Option<&OwnerBits>) -> Told {
-        let Some(owner) = owner else { return Told::NotTold };
-        match (self.profile.fits(words, &owner.bits), owner.proves) {
-            (Some(true), Proves::Bus) => Told::Yes,
-            (Some(false), _) => Told::No(OTHERS),
-            (Some(true), Proves::Nothing) | (None, _) => Told::NotTold,
-        }
+    /// Whether the drive tells that its reference is the bus's.
+    pub(super) fn reference_is_ours(&self, words: &Words) -> bool {
+        owned(words, self.sight.reference_by.as_ref()) == Told::Yes
     }
 
     pub(super) fn evidence(&self, status: &Status, words: &Words) -> Evidence {
-        let owner = &self.profile.file().ownership;
-        let command = self.owned(words, owner.command.given().map(crate::format::Spanned::get_ref));
-        let other = self.agreed.is_some()
-            && self.setpoint_seen(words).is_some()
-            && self.agreed != self.setpoint_seen(words);
-        let reference = match self.owned(words, owner.reference.given().map(crate::format::Spanned::get_ref))
-        {
+        let command = owned(words, self.sight.commanded_by.as_ref());
+        let seen = self.agreed.and_then(|_| self.setpoint_seen(words));
+        let other = seen.is_some() && self.agreed != seen;
+        let reference = match owned(words, self.sight.reference_by.as_ref()) {
             _ if other => Told::No(OTHER_REFERENCE),
             Told::Yes if self.agreed.is_none() || !self.turns_as_commanded(status) => Told::NotTold,
             told => told,
@@ -324,9 +251,7 @@ impl<P: Port> ProfileDrive<P> {
 
     /// Who has command or reference instead of the bus, where the drive tells it.
     pub(super) fn commanded_by_other(&self, words: &Words) -> Option<Refusal> {
-        let owner = &self.profile.file().ownership;
-        let told = [&owner.command, &owner.reference]
-            .map(|owner| self.owned(words, owner.given().map(crate::format::Spanned::get_ref)));
+        let told = [&self.sight.commanded_by, &self.sight.reference_by].map(|by| owned(words, by.as_ref()));
         told.into_iter().find_map(|told| if let Told::No(because) = told { Some(because) } else { None })
     }
 
@@ -353,23 +278,20 @@ impl<P: Port> ProfileDrive<P> {
     }
 
     pub(super) async fn read_measurements(&mut self) -> Result<Measurements> {
-        let blocks = self.slow.clone();
-        let words = self.read_blocks(Class::Background, &blocks).await?;
-        let see = &self.profile.file().see;
-        let of = |name: Option<&crate::format::Spanned<String>>, unit| {
-            self.profile.hundredths(&words, name?.get_ref(), unit)
-        };
+        let sight = self.sight.clone();
+        let words = self.read_blocks(Class::Background, &sight.slow).await?;
+        let of = |cell: Option<Cell>, unit| cell?.hundredths(&words, unit);
         let volts =
-            |name| of(name, UnitName::Volt).and_then(|hundredths| u32::try_from(hundredths / 10).ok());
-        let rpm = of(see.speed.given(), UnitName::Rpm)
-            .and_then(|hundredths| u32::try_from(hundredths.abs() / 100).ok());
-        let reference = see.setpoint.given().and_then(|name| self.frequency(&words, name.get_ref()));
+            |cell| of(cell, UnitName::Volt).and_then(|hundredths| u32::try_from(hundredths / 10).ok());
+        let rpm =
+            of(sight.speed, UnitName::Rpm).and_then(|hundredths| u32::try_from(hundredths.abs() / 100).ok());
+        let reference = sight.setpoint.and_then(|setpoint| self.frequency(&words, setpoint));
         Ok(Measurements {
             at: self.registers.snapshot_time(),
             reference: reference.map(Into::into),
             speed: rpm.map(Speed::from_rpm),
-            output_voltage: volts(see.output_voltage.given()).map(Voltage::from_decivolts),
-            dc_bus_voltage: volts(see.dc_bus_voltage.given()).map(Voltage::from_decivolts),
+            output_voltage: volts(sight.output_voltage).map(Voltage::from_decivolts),
+            dc_bus_voltage: volts(sight.dc_bus_voltage).map(Voltage::from_decivolts),
             raw: self.raw(&words),
             ..Measurements::default()
         })
@@ -384,8 +306,14 @@ impl<P: Port> ProfileDrive<P> {
     }
 }
 
-fn see_code(profile: &crate::profile::Profile, words: &Words) -> Option<u16> {
-    profile.word(words, profile.file().faults.present.given()?.get_ref())
+/// Whether it is the bus, by the bits that tell it.
+fn owned(words: &Words, by: Option<&(Test, Proves)>) -> Told {
+    let Some((test, proves)) = by else { return Told::NotTold };
+    match (test.fits(words), proves) {
+        (Some(true), Proves::Bus) => Told::Yes,
+        (Some(false), _) => Told::No(OTHERS),
+        (Some(true), Proves::Nothing) | (None, _) => Told::NotTold,
+    }
 }
 
 /// What keeps a run command from being in force, by what the drive shows of it.

@@ -2,7 +2,7 @@
 
 use drive_core::{
     Class, Command as Order, Confirming, Control, Error, ErrorKind, Frequency, Lease, Port, Refusal, Result,
-    SETTLED_WITHIN, Setpoint, SetpointProblem, Speed, State, Status, Told, Verdict,
+    SETTLED_WITHIN, Setpoint, SetpointProblem, Speed, State, Status, Verdict,
 };
 
 use tokio::time::Instant;
@@ -133,7 +133,7 @@ impl<P: Port> ProfileDrive<P> {
             let read = self.read_block(Class::Command, block).await.ok()?;
             words.keep(block, read);
         }
-        self.frequency(&words, name).map(|frequency| frequency.centihertz().into())
+        self.frequency(&words, profile.cell(name)?).map(|frequency| frequency.centihertz().into())
     }
 
     fn takes(&self, register: &Register, setpoint: Setpoint) -> Result<()> {
@@ -181,11 +181,11 @@ impl<P: Port> ProfileDrive<P> {
         let slave = self.registers.slave();
         let problem = |problem| Error::Setpoint { slave, setpoint, problem };
         let refused = |reason| self.refused(Order::Setpoint(setpoint), reason);
+        let hertz = self.profile.cell(fact.register.get_ref()).and_then(|cell| self.hertz_of(held, cell));
         let (value, scale) = match setpoint {
-            Setpoint::Frequency(frequency) => (
-                i64::from(frequency.centihertz()),
-                self.hertz_of(register, held).ok_or_else(|| refused(NO_FULL_SCALE))?,
-            ),
+            Setpoint::Frequency(frequency) => {
+                (i64::from(frequency.centihertz()), hertz.ok_or_else(|| refused(NO_FULL_SCALE))?)
+            }
             Setpoint::Share(share) => (i64::from(share.hundredths()), self.scale(register)?),
             Setpoint::Speed(speed) => (i64::from(speed.rpm()) * 100, self.scale(register)?),
         };
@@ -197,7 +197,7 @@ impl<P: Port> ProfileDrive<P> {
         if let Some(name) = &limits.high_in {
             let allowed = if name.get_ref() == "owner" {
                 let highest = self.owner.highest.ok_or_else(|| refused(NO_HIGHEST))?;
-                self.hertz_of(register, held).map(|[numerator, denominator]| {
+                hertz.map(|[numerator, denominator]| {
                     i64::from(highest.centihertz()).saturating_mul(denominator)
                         / numerator.saturating_mul(100)
                 })
@@ -221,7 +221,7 @@ impl<P: Port> ProfileDrive<P> {
 
     /// What a register allows, in counts of the setpoint's.
     fn allowed(&self, register: &Register, name: &str, held: &Words) -> Option<i64> {
-        let highest = self.profile.hundredths(held, name, register.unit)?;
+        let highest = self.profile.cell(name)?.hundredths(held, register.unit)?;
         let [numerator, denominator] = *register.scale.as_ref()?.get_ref();
         highest.checked_mul(denominator).map(|counts| counts / numerator.saturating_mul(100))
     }
@@ -259,7 +259,6 @@ impl<P: Port> ProfileDrive<P> {
         let taken = file.setpoint.given().map(|fact| fact.get_ref().register.get_ref());
         let seen = file.see.setpoint.given().map(crate::format::Spanned::get_ref);
         let is_echo = seen.is_none() || seen == taken && !file.starts_by_setpoint();
-        let reference = file.ownership.reference.given().map(crate::format::Spanned::get_ref);
         let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
         let mut first = None;
         loop {
@@ -280,7 +279,7 @@ impl<P: Port> ProfileDrive<P> {
             } else {
                 status.reference
             };
-            let is_bus = seen.is_some() && self.owned(&words, reference) == Told::Yes;
+            let is_bus = seen.is_some() && self.reference_is_ours(&words);
             let runs = status.state == State::Running;
             let is_borne_out = if runs {
                 !is_echo

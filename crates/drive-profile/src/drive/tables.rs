@@ -4,17 +4,20 @@ use std::time::Duration;
 
 use drive_core::{
     Capabilities, FaultEntry, Quantity, Row, SerialSettings, StopMode, interned,
-    registers::{Access, Confidence, Factory, Form, Range, Storage, Unit},
+    registers::{Access, Choice, Confidence, Factory, Form, Place, Range, Storage, Unit},
     serial::CharacterFormat,
 };
 
 use crate::{
-    format::{self, ModeName, Register, Space, UnitName},
+    format::{self, ModeName, Register, UnitName},
     profile::Profile,
 };
 
 /// The speeds that are let of a drive whose own are not known: who has it knows them.
 const USUAL: &[u32] = &[1_200, 2_400, 4_800, 9_600, 19_200, 38_400, 57_600, 115_200];
+
+/// What a coil or an input can be.
+const BIT: &[Choice] = &[Choice::new(0, "off", ""), Choice::new(1, "on", "")];
 
 const MODES: [(ModeName, StopMode); 4] = [
     (ModeName::Ramp, StopMode::Ramp),
@@ -140,23 +143,25 @@ impl Profile {
         said.unwrap_or(usual)
     }
 
-    /// Its holding registers, but for the halves of a word: those that are no parameters are only read.
+    /// Its registers, coils and inputs, but for the second byte of a word: those that are no parameters are only read.
     fn rows(&self) -> Vec<Row> {
         let mut rows: Vec<Row> = Vec::new();
         for (name, spanned) in &self.file.register {
             let register = spanned.get_ref();
-            let Some((Space::HoldingRegister, address)) = self.file.place(register) else { continue };
-            if rows.iter().all(|row| row.address != address) {
-                rows.push(self.row(name, register, address));
+            let Some((space, address)) = self.file.place(register) else { continue };
+            let place = Place { space, address };
+            if rows.iter().all(|row| row.place() != place) {
+                rows.push(self.row(name, register, place));
             }
         }
-        rows.sort_by_key(|row| row.address);
+        rows.sort_by_key(Row::place);
         rows
     }
 
-    fn row(&self, name: &str, register: &Register, address: u16) -> Row {
+    fn row(&self, name: &str, register: &Register, Place { space, address }: Place) -> Row {
         let sound = crate::source::grade(&self.file, &register.source) == format::Mark::P;
         Row {
+            space,
             address,
             code: interned::text(name),
             name: interned::text(&register.what),
@@ -172,11 +177,15 @@ impl Profile {
                 Some(format::Storage::Eeprom) => Storage::Eeprom,
                 Some(format::Storage::Unknown) => Storage::Unknown,
             },
-            unit: unit(register),
-            range: register.range.as_ref().map_or(Range::Any, |range| {
-                let [low, high] = *range.get_ref();
-                Range::Within(low, high)
-            }),
+            unit: if space.is_bit() { Unit::CODE } else { unit(register) },
+            range: match &register.range {
+                _ if space.is_bit() => Range::OneOf(BIT),
+                Some(range) => {
+                    let [low, high] = *range.get_ref();
+                    Range::Within(low, high)
+                }
+                None => Range::Any,
+            },
             factory: register
                 .factory
                 .as_ref()

@@ -12,6 +12,7 @@ mod spanned;
 use std::collections::BTreeMap;
 
 use drive_core::State;
+pub use drive_core::registers::Space;
 use serde::Deserialize;
 
 pub use action::{Action, Acts, Command, Deed, ModeName, Rung, Sign, Start, Step, Stops};
@@ -20,7 +21,7 @@ pub use facts::{
     Bits, Codes, Direction, Faults, FedBy, Forbidden, Guard, Limits, Owner, Proves, Setpoint, Source, Tried,
     Watchdog,
 };
-pub use register::{Access, Byte, Order, Register, Space, Storage, UnitName};
+pub use register::{Access, Byte, Order, Register, Storage, UnitName};
 pub use spanned::Spanned;
 
 /// The version of the format that this crate writes. It reads this one and no other: an older file is refused with what to change.

@@ -1,5 +1,6 @@
 //! A register as a file names it.
 
+use drive_core::registers::Space;
 use serde::Deserialize;
 
 use super::{Answer, Spanned};
@@ -45,50 +46,6 @@ pub struct Register {
     pub factory: Option<Answer<u16>>,
     /// Where this is from.
     pub source: Spanned<String>,
-}
-
-/// Where a register stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Deserialize)]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-#[serde(rename_all = "snake_case")]
-pub enum Space {
-    /// A bit that can be read and written.
-    Coil,
-    /// A bit that can be read.
-    DiscreteInput,
-    /// A word that can be read.
-    InputRegister,
-    /// A word that can be read and written.
-    HoldingRegister,
-}
-
-impl Space {
-    /// Whether one of it is a bit.
-    #[must_use]
-    pub const fn is_bit(self) -> bool {
-        matches!(self, Self::Coil | Self::DiscreteInput)
-    }
-
-    /// The function that reads it.
-    #[must_use]
-    pub const fn read_by(self) -> u8 {
-        match self {
-            Self::Coil => 1,
-            Self::DiscreteInput => 2,
-            Self::HoldingRegister => 3,
-            Self::InputRegister => 4,
-        }
-    }
-
-    /// The functions that write one or several of it.
-    #[must_use]
-    pub const fn written_by(self) -> Option<[u8; 2]> {
-        match self {
-            Self::Coil => Some([5, 15]),
-            Self::HoldingRegister => Some([6, 16]),
-            Self::DiscreteInput | Self::InputRegister => None,
-        }
-    }
 }
 
 /// Who may write a register.

@@ -163,7 +163,7 @@ impl SimSlave {
             }
             Deed::Get(register) => {
                 let value = self.peek(register).ok_or_else(|| self.no_register(register))?;
-                let row = self.surroundings().rows.iter().find(|row: &&Row| row.address == register);
+                let row = self.surroundings().rows.iter().find(|row: &&Row| row.place() == register.into());
                 return Ok(Some(row.map_or_else(|| format!("{value:04X}h"), |row| row.show(value))));
             }
             Deed::Show => return Ok(Some(seen(self.observe()))),

@@ -2,7 +2,7 @@
 
 use drive_core::{
     Frequency, Percent,
-    registers::{Row, Unit},
+    registers::{Row, Space, Unit},
 };
 
 use super::ControlError;
@@ -135,7 +135,8 @@ impl<'a> Words<'a> {
 
     fn register(&mut self, around: &Surroundings) -> Result<(u16, Option<&'static Row>), ControlError> {
         let word = self.next();
-        let row = Row::find(around.rows, word);
+        // A coil or an input is not set and read by its address alone.
+        let row = Row::find(around.rows, word).filter(|row| row.space == Space::HoldingRegister);
         let address = row.map_or_else(|| Unit::COUNT.read(word), |row| Some(row.address));
         Ok((address.ok_or_else(|| not(word, "a register, by its mnemonic or its address"))?, row))
     }

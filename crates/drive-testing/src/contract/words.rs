@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use drive_core::{
     Class, Direction, Drive, Error, ExceptionMeaning, Frequency, Reaction, Registers, Setpoint, Speed,
-    StopMode,
+    StopMode, registers::Space,
 };
 
 use super::{Contract, ControlWord, StatusWord};
@@ -101,7 +101,12 @@ impl Contract {
         if self.exceptions.is_empty() {
             return;
         }
-        let row = self.capabilities.rows.iter().find(|row| row.access.is_readable()).expect("it has one");
+        let row = self
+            .capabilities
+            .rows
+            .iter()
+            .find(|row| row.space == Space::HoldingRegister && row.access.is_readable())
+            .expect("it has one");
         for code in 1..=u8::MAX {
             let mut words = Words::new(self.capabilities, &[]);
             words.refused.insert(row.address, code);

@@ -114,7 +114,7 @@ fn of_values(key: &str, before: &Value, now: &Value, rows: &[Row], has_bands: bo
 /// A word with a unit is told as a value beside it; of one without a unit each bit counts.
 fn of_words(before: &Value, now: &Value, rows: &[Row]) -> News {
     let is_value = |row: &Row| !row.unit.symbol.is_empty();
-    let row = rows.iter().find(|row| now["address"] == row.address);
+    let row = rows.iter().find(|row| now["address"] == row.address && now["code"] == row.code);
     match before == now {
         true => News::Nothing,
         false if before["address"] == now["address"] && row.is_some_and(is_value) => News::Little,

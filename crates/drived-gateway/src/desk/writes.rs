@@ -357,7 +357,7 @@ impl Desk {
         let rows = drive.capabilities().rows;
         let mut writes: Vec<(&'static Row, u16)> = Vec::new();
         for (register, word) in ask.writes() {
-            let row = rows.iter().find(|row| row.address == register && row.access.is_writable());
+            let row = rows.iter().find(|row| row.place() == register.into() && row.access.is_writable());
             let Some(row) = row else {
                 let why = format!("register {register} is no parameter of the family's list");
                 return Err(Refusal::new(ExceptionCode::IllegalDataAddress, why));

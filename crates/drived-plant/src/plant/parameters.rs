@@ -9,7 +9,7 @@ use std::{
 
 use drive_core::{
     Capabilities, Error, ErrorKind, Row, Written,
-    registers::{Access, Form, Storage},
+    registers::{Access, Form, Place, Space, Storage},
 };
 use drive_fleet::{DriveHandle, Refused};
 use schemars::JsonSchema;
@@ -25,15 +25,18 @@ use drived_words::{
 /// A word that was read this lately is not read again for a list.
 const YOUNG: Duration = Duration::from_secs(60);
 
-/// Words that were read, by drive and address.
+/// Words that were read, by drive and place.
 #[derive(Default)]
-pub(super) struct Words(Mutex<BTreeMap<(String, u16), (u16, Instant)>>);
+pub(super) struct Words(Mutex<BTreeMap<(String, Place), (u16, Instant)>>);
 
 /// One register, and what the drive holds in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ParameterView {
     pub mnemonic: Cow<'static, str>,
     pub address: u16,
+    /// Where that address is: `coil`, `discrete_input` or `input_register`; absent of a holding register.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub space: Option<Space>,
     pub name: Cow<'static, str>,
     /// In its unit, or the mnemonic of a listed value; absent where it has not been read, or can only be written.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -97,6 +100,11 @@ pub struct WrittenView {
 }
 
 impl ParameterView {
+    /// Where it stands.
+    pub fn place(&self) -> Place {
+        Place { space: self.space.unwrap_or(Space::HoldingRegister), address: self.address }
+    }
+
     /// What was read a moment ago.
     pub fn read(capabilities: &Capabilities, row: &Row, raw: u16) -> Self {
         Self::of(capabilities, row, Some((raw, Instant::now())), None)
@@ -122,6 +130,7 @@ impl ParameterView {
         Self {
             mnemonic: row.code.into(),
             address: row.address,
+            space: Some(row.space).filter(|space| *space != Space::HoldingRegister),
             name: row.name.into(),
             value: raw.map(|raw| ValueView::of(row, raw)),
             text: raw.map(|raw| row.show(raw)),
@@ -158,7 +167,7 @@ impl ValueView {
 impl Words {
     fn of(&self, drive: &DriveHandle, row: &Row) -> Option<(u16, Instant)> {
         let words = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        words.get(&(drive.name().to_string(), row.address)).copied()
+        words.get(&(drive.name().to_string(), row.place())).copied()
     }
 
     /// A row in the unit that it has, as far as what chooses that has been read.
@@ -170,7 +179,7 @@ impl Words {
 
     fn keep(&self, drive: &DriveHandle, row: &Row, word: Option<u16>) -> Option<(u16, Instant)> {
         let mut words = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let key = (drive.name().to_string(), row.address);
+        let key = (drive.name().to_string(), row.place());
         let word = word.map(|word| (word, Instant::now()));
         match word {
             Some(word) => words.insert(key, word),

@@ -56,7 +56,7 @@ pub(super) fn name(family: Option<Family>, address: u16) -> String {
 }
 
 fn row(family: Option<Family>, address: u16) -> Option<&'static Row> {
-    family?.capabilities().rows.iter().find(|row| row.address == address)
+    family?.capabilities().rows.iter().find(|row| row.place() == address.into())
 }
 
 /// The bits that are 1.

@@ -1,10 +1,11 @@
 //! What is read and written beside orders.
 
-use drive_core::registers::{Access, Confidence, Factory, Range, Row, Unit};
+use drive_core::registers::{Access, Confidence, Factory, Range, Row, Space, Unit};
 
 use super::*;
 
 pub(super) const ROW: Row = Row {
+    space: Space::HoldingRegister,
     address: 9001,
     code: "ACC",
     name: "acceleration",

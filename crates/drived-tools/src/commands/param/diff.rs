@@ -212,7 +212,7 @@ impl Comparison {
 }
 
 fn cell(side: &Backup, row: &Row) -> Cell {
-    match side.entries.iter().find(|entry| entry.row.address == row.address).map(|entry| &entry.held) {
+    match side.entries.iter().find(|entry| entry.row.place() == row.place()).map(|entry| &entry.held) {
         Some(Ok(word)) => Cell::Holds(side.text(row, *word), *word),
         Some(Err(why)) => Cell::Unread(why.clone()),
         None => Cell::Lacks,

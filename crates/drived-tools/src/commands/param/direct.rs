@@ -15,7 +15,7 @@ pub(super) async fn get(args: &OneDriveArgs, registers: &[String]) -> Result<(),
     let family = args.name()?.family;
     let rows = registers.iter().map(|text| find(family, text)).collect::<Result<Vec<_>, _>>()?;
     if let Some(row) = rows.iter().find(|row| !row.access.is_readable()) {
-        return Err(Failure::Input(format!("{} ({}) can only be written", row.code, row.address)));
+        return Err(Failure::Input(format!("{} ({}) can only be written", row.code, row.place())));
     }
     let mut one = args.open().await?;
     let mut read = Vec::new();
@@ -44,7 +44,8 @@ pub(super) async fn set(
         if row.storage == Storage::Volatile {
             return Err(Failure::Input(format!(
                 "{name}: {} ({}) is kept in RAM only, {by} does not save it: leave out --save",
-                row.code, row.address
+                row.code,
+                row.place()
             )));
         }
     }

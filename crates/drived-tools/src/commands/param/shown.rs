@@ -18,7 +18,7 @@ pub(super) fn list(family: Family) -> Table {
     let capabilities = family.capabilities();
     for row in capabilities.rows {
         table.row([
-            row.address.to_string(),
+            row.place().to_string(),
             row.code.to_owned(),
             with_range(row),
             format!("{} {}", row.access, row.storage),
@@ -47,7 +47,7 @@ pub(super) fn value_table() -> Table {
 /// A row of it.
 pub(super) fn value_cells(capabilities: &Capabilities, row: &Row, value: String) -> [String; 6] {
     [
-        row.address.to_string(),
+        row.place().to_string(),
         row.code.to_owned(),
         value,
         with_range(row),

@@ -5,7 +5,7 @@ mod write;
 
 use drive_core::{
     Row,
-    registers::{Factory, Part},
+    registers::{Factory, Part, Place},
 };
 use drive_families::Family;
 
@@ -49,8 +49,9 @@ pub fn is_kept(family: Family, row: &Row) -> bool {
 
 impl Backup {
     /// The word of a register, if it was read.
-    pub fn word(&self, address: u16) -> Option<u16> {
-        let entry = self.entries.iter().find(|entry| entry.row.address == address)?;
+    pub fn word(&self, place: impl Into<Place>) -> Option<u16> {
+        let place = place.into();
+        let entry = self.entries.iter().find(|entry| entry.row.place() == place)?;
         entry.held.as_ref().ok().copied()
     }
 

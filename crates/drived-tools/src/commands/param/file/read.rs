@@ -2,13 +2,16 @@
 
 use std::{collections::BTreeMap, fs, io::Read as _, ops::Range, path::Path};
 
-use drive_core::Row;
+use drive_core::{
+    Row,
+    registers::{Place, Space},
+};
 use drive_families::{Family, UnknownFamily};
 use serde::Deserialize;
 use toml::Spanned;
 
 use super::{Backup, Entry, Head, is_kept};
-use drived_config::config::Source as Place;
+use drived_config::config::Source;
 use drived_words::failure::Failure;
 
 /// A family has a few hundred registers, and a line for each.
@@ -44,6 +47,7 @@ struct Line {
     raw: Option<u16>,
     error: Option<String>,
     address: Option<u16>,
+    space: Option<Space>,
     #[serde(rename = "factory")]
     _factory: Option<String>,
     #[serde(rename = "access")]
@@ -82,7 +86,7 @@ impl Backup {
 
     /// The same for its text.
     pub fn parse(path: &Path, text: &str) -> Result<Self, Failure> {
-        let place = Place { file: path, text };
+        let place = Source { file: path, text };
         let wrong = |at: Range<usize>, why: String| Failure::Input(place.error(at, why).to_string());
         let read: Text = toml::from_str(text).map_err(|error| {
             let why = error.message().lines().next().unwrap_or_default().to_owned();
@@ -96,7 +100,7 @@ impl Backup {
         let family = known.map_err(|error| wrong(family.span(), UnknownFamily::to_string(&error)))?;
         let rows = family.capabilities().rows;
 
-        let mut lines: BTreeMap<u16, &Spanned<Line>> = BTreeMap::new();
+        let mut lines: BTreeMap<Place, &Spanned<Line>> = BTreeMap::new();
         for (code, line) in read.rating.iter().chain(&read.parameters) {
             let row = rows.iter().find(|row| row.code == code).filter(|row| is_kept(family, row));
             let Some(row) = row else {
@@ -105,7 +109,10 @@ impl Backup {
             if line.get_ref().address.is_some_and(|address| address != row.address) {
                 return Err(wrong(line.span(), format!("{code} has the address {}", row.address)));
             }
-            if lines.insert(row.address, line).is_some() {
+            if line.get_ref().space.unwrap_or(Space::HoldingRegister) != row.space {
+                return Err(wrong(line.span(), format!("{code} is a {}", row.space)));
+            }
+            if lines.insert(row.place(), line).is_some() {
                 return Err(wrong(line.span(), format!("{code} stands there twice")));
             }
         }
@@ -114,16 +121,16 @@ impl Backup {
         // First what chooses the unit of others.
         let (mut scaled, mut held) = (Vec::new(), BTreeMap::new());
         for row in rows {
-            let Some(line) = lines.get(&row.address) else { continue };
+            let Some(line) = lines.get(&row.place()) else { continue };
             if family.capabilities().scaled_by(row.address).is_some() {
                 scaled.push((row, line));
             } else {
                 let word = line.get_ref().held(row).map_err(|why| wrong(line.span(), why))?;
-                held.insert(row.address, word);
+                held.insert(row.place(), word);
             }
         }
         for (row, line) in scaled {
-            let known = |address| held.get(&address).and_then(|word| word.as_ref().ok()).copied();
+            let known = |address: u16| held.get(&address.into()).and_then(|word| word.as_ref().ok()).copied();
             let by = family.capabilities().scaled_by(row.address).filter(|by| known(by.address).is_none());
             if let (Some(by), None) = (by, &line.get_ref().error) {
                 let why = format!("{} has its unit by {}, which the file does not have", row.code, by.code);
@@ -131,9 +138,9 @@ impl Backup {
             }
             let in_units = family.capabilities().in_units(row, known);
             let word = line.get_ref().held(&in_units).map_err(|why| wrong(line.span(), why))?;
-            held.insert(row.address, word);
+            held.insert(row.place(), word);
         }
-        let entry = |row: &'static Row| held.remove(&row.address).map(|held| Entry { row, held });
+        let entry = |row: &'static Row| held.remove(&row.place()).map(|held| Entry { row, held });
         backup.entries = rows.iter().filter_map(entry).collect();
         Ok(backup)
     }

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use drive_core::registers::Part;
+use drive_core::registers::{Part, Space};
 
 use super::{Backup, Entry};
 use drived_config::kept::{Kept, Readers};
@@ -54,6 +54,9 @@ impl Backup {
         let factory = factory(self.head.family.capabilities(), row);
         if !factory.is_empty() {
             write!(f, ", factory = {}", quoted(&factory))?;
+        }
+        if row.space != Space::HoldingRegister {
+            write!(f, ", space = {}", quoted(&row.space.to_string().replace(' ', "_")))?;
         }
         writeln!(f, ", access = {}, address = {} }}", quoted(&row.access.to_string()), row.address)
     }

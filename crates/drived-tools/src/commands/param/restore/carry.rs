@@ -47,8 +47,8 @@ impl Carried {
     fn has_done(&self, row: &Row) -> bool {
         let mut done = self.written.iter().map(|change| change.row).chain(self.held_back.iter().copied());
         let mut refused = self.refused.iter();
-        done.any(|done| done.address == row.address)
-            || refused.any(|(refused, _)| refused.address == row.address)
+        done.any(|done| done.place() == row.place())
+            || refused.any(|(refused, _)| refused.place() == row.place())
     }
 }
 
@@ -72,9 +72,9 @@ pub(super) async fn carry(plan: &Plan, source: &mut Source, ending: &mut Ending)
     }
     let mut carried = carrying.carried;
     if let Some(stopped) = &carried.stopped {
-        let unknown = stopped.is_unknown.then_some(stopped.at.address);
+        let unknown = stopped.is_unknown.then_some(stopped.at.place());
         let rows = plan.changes.iter().map(|change| change.row);
-        let left = rows.filter(|row| !carried.has_done(row) && Some(row.address) != unknown);
+        let left = rows.filter(|row| !carried.has_done(row) && Some(row.place()) != unknown);
         carried.left = left.collect();
     }
     carried
@@ -99,14 +99,14 @@ impl Carrying<'_> {
             self.progress.step();
             match self.source.read(wanted.row).await {
                 Ok(word) => {
-                    self.way.hold(wanted.row.address, word);
+                    self.way.hold(wanted.row.place(), word);
                     readable.push(*wanted);
                 }
                 Err(Unread::Refused(why)) => self.carried.refused.push((wanted.row, why)),
                 Err(Unread::Silent(why)) => return Err(Stopped { at: wanted.row, why, is_unknown: false }),
             }
         }
-        let mut pending = ordered(&readable, &|row| self.way.word(row.address));
+        let mut pending = ordered(&readable, &|row| self.way.word(row.place()));
         if pending.iter().any(|change| !self.goes_on_behind_a_refusal(change.row)) {
             self.carried.held_back.extend(pending.drain(..).map(|change| change.row));
         }
@@ -135,9 +135,9 @@ impl Carrying<'_> {
         let addresses: Vec<u16> = pending.iter().map(|change| change.row.address).collect();
         for row in self.way.related(&addresses) {
             match self.source.read(row).await {
-                Ok(word) => self.way.hold(row.address, word),
+                Ok(word) => self.way.hold(row.place(), word),
                 // What the drive does not tell is compared with nothing.
-                Err(Unread::Refused(_)) => self.way.forget(row.address),
+                Err(Unread::Refused(_)) => self.way.forget(row.place()),
                 Err(Unread::Silent(why)) => return Err(Stopped { at: row, why, is_unknown: false }),
             }
         }
@@ -155,12 +155,12 @@ impl Carrying<'_> {
         };
         match outcome {
             Ok(()) => {
-                self.way.hold(change.row.address, change.wanted);
+                self.way.hold(change.row.place(), change.wanted);
                 self.carried.written.push(change);
             }
             Err(Unwritten::Refused(why)) => self.carried.refused.push((change.row, why)),
             Err(Unwritten::ReadsBack(word)) => {
-                self.way.hold(change.row.address, word);
+                self.way.hold(change.row.place(), word);
                 let why = format!(
                     "it was written and reads back as {}: the drive has not taken {}",
                     self.way.text(change.row, word),

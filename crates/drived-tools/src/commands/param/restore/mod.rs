@@ -262,7 +262,7 @@ async fn restore(
     }
     let slave = source.slave();
     for (row, why) in &carried.refused {
-        text.push(format!("refused: {name}, slave {slave}, {} ({}): {why}", row.code, row.address));
+        text.push(format!("refused: {name}, slave {slave}, {} ({}): {why}", row.code, row.place()));
     }
     if !carried.held_back.is_empty() {
         let codes: Vec<_> = carried.held_back.iter().map(|row| row.code).collect();
@@ -311,7 +311,7 @@ fn other_model(file: &Backup, now: &Backup) -> Option<String> {
     let mut ratings = file.entries.iter().filter(|entry| restoring.part(entry.row) == Part::Rating);
     let rating = ratings.find_map(|entry| {
         let (row, word) = (entry.row, *entry.held.as_ref().ok()?);
-        let held = now.word(row.address).filter(|held| *held != word)?;
+        let held = now.word(row.place()).filter(|held| *held != word)?;
         Some(format!("{} is {} and was {}", row.code, now.text(row, held), file.text(row, word)))
     });
     rating.or_else(|| match (&file.head.model, &now.head.model) {
@@ -347,12 +347,12 @@ async fn verify(
     };
     let differences = Comparison::of(file, &now, with_communication).differences;
     let is_skipped =
-        |row: &drive_core::Row| plan.skipped.iter().any(|(skipped, _)| skipped.address == row.address);
-    let has = |row: &drive_core::Row| file.word(row.address).is_some();
+        |row: &drive_core::Row| plan.skipped.iter().any(|(skipped, _)| skipped.place() == row.place());
+    let has = |row: &drive_core::Row| file.word(row.place()).is_some();
     let rows = differences.iter().map(|difference| difference.row);
     let is_told = |row: &drive_core::Row| {
         let refused = carried.refused.iter().map(|(row, _)| *row);
-        refused.chain(carried.held_back.iter().copied()).any(|told| told.address == row.address)
+        refused.chain(carried.held_back.iter().copied()).any(|told| told.place() == row.place())
     };
     carried.left = rows.filter(|row| has(row) && !is_skipped(row) && !is_told(row)).collect();
     if carried.left.is_empty() {

@@ -38,9 +38,9 @@ impl Plan {
         let capabilities = file.head.family.capabilities();
         let (mut skipped, mut missing) = (Vec::new(), Vec::new());
         for Entry { row, held } in &file.entries {
-            let differs = held.as_ref().ok().copied() != now.word(row.address);
+            let differs = held.as_ref().ok().copied() != now.word(row.place());
             let part = capabilities.restoring.part(row);
-            let is_unread = held.is_err() || now.word(row.address).is_none();
+            let is_unread = held.is_err() || now.word(row.place()).is_none();
             let why = match (part, held) {
                 (Part::Rating | Part::Passing, _) => continue,
                 (_, Err(why)) => format!("could not be read when it was kept: {why}"),
@@ -48,7 +48,7 @@ impl Plan {
                 (Part::Communication, Ok(_)) if differs && !with_communication => {
                     "it changes the line itself: --with-communication writes it, last".to_owned()
                 }
-                (Part::Setting | Part::Communication, Ok(_)) if now.word(row.address).is_none() => {
+                (Part::Setting | Part::Communication, Ok(_)) if now.word(row.place()).is_none() => {
                     "the drive does not tell what it holds".to_owned()
                 }
                 _ => continue,
@@ -60,8 +60,8 @@ impl Plan {
             skipped.push((*row, why));
         }
         let wanted = |row: &'static Row| {
-            let is_wanted = !skipped.iter().any(|(skipped, _)| skipped.address == row.address);
-            file.word(row.address).filter(|_| is_wanted).map(|word| Wanted { row, word })
+            let is_wanted = !skipped.iter().any(|(skipped, _)| skipped.place() == row.place());
+            file.word(row.place()).filter(|_| is_wanted).map(|word| Wanted { row, word })
         };
         let is_line = |row: &&Row| capabilities.restoring.part(row) == Part::Communication;
         let steps = capabilities.restoring.steps(capabilities.rows).into_iter().map(|step| {
@@ -70,7 +70,7 @@ impl Plan {
         });
         let steps: Vec<Vec<Wanted>> = steps.filter(|step| !step.is_empty()).collect();
         let words =
-            now.entries.iter().filter_map(|entry| Some((entry.row.address, *entry.held.as_ref().ok()?)));
+            now.entries.iter().filter_map(|entry| Some((entry.row.place(), *entry.held.as_ref().ok()?)));
         let way = Way::of(capabilities, words);
         let changes = in_steps(&steps, way.clone())?;
         for Change { row, wanted, .. } in &changes {
@@ -79,7 +79,7 @@ impl Plan {
                 return Err(Failure::Input(format!(
                     "{} ({}): {} is not allowed, expected: {}",
                     row.code,
-                    row.address,
+                    row.place(),
                     shown.show(*wanted),
                     range(&shown)
                 )));
@@ -93,7 +93,7 @@ impl Plan {
         let restoring = file.head.family.capabilities().restoring;
         self.skipped.iter().find_map(|(row, _)| {
             let Part::ByHand(why) = restoring.part(row) else { return None };
-            let (was, is) = (file.word(row.address)?, now.word(row.address)?);
+            let (was, is) = (file.word(row.place())?, now.word(row.place())?);
             Some(format!("{} was {} and is {}: {why}", row.code, file.text(row, was), now.text(row, is)))
         })
     }
@@ -135,10 +135,10 @@ impl Plan {
 
 /// What is written, one after the other, so that what the manual wants to hold among values holds at every moment.
 fn in_steps(steps: &[Vec<Wanted>], mut way: Way) -> Result<Vec<Change>, Failure> {
-    let of_step = |step: &Vec<Wanted>, way: &Way| ordered(step, &|row| way.word(row.address));
+    let of_step = |step: &Vec<Wanted>, way: &Way| ordered(step, &|row| way.word(row.place()));
     let mut end = way.clone();
     let all: Vec<Change> = steps.iter().flat_map(|step| of_step(step, &way)).collect();
-    all.iter().for_each(|change| end.hold(change.row.address, change.wanted));
+    all.iter().for_each(|change| end.hold(change.row.place(), change.wanted));
     let changed: Vec<u16> = all.iter().map(|change| change.row.address).collect();
     if let Some(why) = end.breaks(&changed) {
         let why = format!("the drive would be left with {why}: mend the file; nothing was written");
@@ -148,7 +148,7 @@ fn in_steps(steps: &[Vec<Wanted>], mut way: Way) -> Result<Vec<Change>, Failure>
     for step in steps {
         let mut pending = of_step(step, &way);
         while let Some(change) = way.take(&mut pending) {
-            way.hold(change.row.address, change.wanted);
+            way.hold(change.row.place(), change.wanted);
             changes.push(change);
         }
         if let Some(why) = pending.first().and_then(|change| way.would_break(change)) {

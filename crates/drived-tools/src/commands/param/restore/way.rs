@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use drive_core::{
     Capabilities, Row,
-    registers::{Change, Relation, Restoring},
+    registers::{Change, Place, Relation, Restoring},
 };
 
 use drived_words::registers::brief;
@@ -13,24 +13,24 @@ use drived_words::registers::brief;
 #[derive(Debug, Clone)]
 pub(super) struct Way {
     capabilities: &'static Capabilities,
-    held: BTreeMap<u16, u16>,
+    held: BTreeMap<Place, u16>,
 }
 
 impl Way {
-    pub(super) fn of(capabilities: &'static Capabilities, held: impl Iterator<Item = (u16, u16)>) -> Self {
+    pub(super) fn of(capabilities: &'static Capabilities, held: impl Iterator<Item = (Place, u16)>) -> Self {
         Self { capabilities, held: held.collect() }
     }
 
-    pub(super) fn word(&self, address: u16) -> Option<u16> {
-        self.held.get(&address).copied()
+    pub(super) fn word(&self, place: impl Into<Place>) -> Option<u16> {
+        self.held.get(&place.into()).copied()
     }
 
-    pub(super) fn hold(&mut self, address: u16, word: u16) {
-        self.held.insert(address, word);
+    pub(super) fn hold(&mut self, place: Place, word: u16) {
+        self.held.insert(place, word);
     }
 
-    pub(super) fn forget(&mut self, address: u16) {
-        self.held.remove(&address);
+    pub(super) fn forget(&mut self, place: Place) {
+        self.held.remove(&place);
     }
 
     pub(super) const fn restoring(&self) -> &'static Restoring {
@@ -55,7 +55,7 @@ impl Way {
     /// What does not hold any more, in words, when a word is written, and did before; `None` where nothing is broken by it.
     pub(super) fn would_break(&self, Change { row, wanted, .. }: &Change) -> Option<String> {
         let mut then = self.clone();
-        then.hold(row.address, *wanted);
+        then.hold(row.place(), *wanted);
         let relations = self.capabilities.restoring.relations.iter();
         let mut concerned = relations.filter(|relation| relation.registers.contains(&row.address));
         concerned.find_map(|relation| {
@@ -85,7 +85,7 @@ impl Way {
 
     fn in_words(&self, relation: &Relation, broken: &[&'static Row]) -> String {
         let holds = broken.iter().filter_map(|row| {
-            let word = self.word(row.address)?;
+            let word = self.word(row.place())?;
             Some(format!("{} {}", row.code, self.text(row, word)))
         });
         format!("{} against {}", holds.collect::<Vec<_>>().join(" and "), relation.why)

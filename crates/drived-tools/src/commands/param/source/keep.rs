@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use chrono::{SecondsFormat, Utc};
-use drive_core::{ErrorKind, Identity};
+use drive_core::{ErrorKind, Identity, registers::Place};
 
 use super::{Source, Unread};
 use crate::commands::param::file::{Backup, Entry, Head, is_kept};
@@ -41,11 +41,11 @@ impl Source {
             entries.push(Entry { row, held });
         }
         // A number without its unit would be restored as another one.
-        let known: BTreeMap<u16, bool> =
-            entries.iter().map(|entry| (entry.row.address, entry.held.is_ok())).collect();
+        let known: BTreeMap<Place, bool> =
+            entries.iter().map(|entry| (entry.row.place(), entry.held.is_ok())).collect();
         for Entry { row, held } in &mut entries {
             if let Some(by) = family.capabilities().scaled_by(row.address)
-                && known.get(&by.address) != Some(&true)
+                && known.get(&by.place()) != Some(&true)
                 && held.is_ok()
             {
                 *held = Err(format!("its unit is that of {}, which could not be read", by.code));
