@@ -3,7 +3,9 @@
 
 use std::time::Duration;
 
-use drive_core::{Command, Control, Error, ErrorKind, Lack, Motion, Refusal, Result, StopMode, Verdict, Withdrawn};
+use drive_core::{
+    Command, Control, Error, ErrorKind, Lack, Motion, Refusal, Result, StopMode, Verdict, Withdrawn,
+};
 use tokio::time::Instant;
 
 use super::{Asker, Job, Supervisor, stopping::REPEAT, verdict::status_of};
