@@ -13,9 +13,9 @@ use crate::{
 };
 
 /// So long before a moment it is looked,
-pub(super) const BEFORE_MS: i64 = 10 * 60_000;
+const BEFORE_MS: i64 = 10 * 60_000;
 /// and so long after.
-pub(super) const AFTER_MS: i64 = 10 * 60_000;
+pub const AFTER_MS: i64 = 10 * 60_000;
 /// So many records at the most: a plant that tells more in twenty minutes is told of in part, and it is said.
 const RECORDS: usize = 20_000;
 

@@ -15,6 +15,7 @@ mod values;
 use drived_plant::plant::past::{Certainty, SentenceView as Sentence, StoryView as Story};
 use rusqlite::Connection;
 
+pub use self::facts::AFTER_MS as LOOKED_AFTER_MS;
 use self::{
     about::{Asked, about, beside},
     course::{AFTER_MS, BEFORE_MS, course, not_known, settings, with_settings},

@@ -92,8 +92,12 @@ fn fed(facts: &Facts, connected: &RecordView) -> Option<Sentence> {
     if let Some(trip) = with_it("tripped") {
         let faults = [Some(trip), facts.explained(trip)].into_iter().flatten();
         let mut faults = faults.filter_map(|found| body(found).fault);
-        let text = "its watchdog had acted when it was heard again, as it does in a drive that is fed and not spoken to: its supply was not away";
-        return faults.any(|fault| fault.by_watchdog).then(|| Sentence::of(Likely, text).at(at));
+        let by_watchdog = faults.any(|fault| fault.by_watchdog);
+        let text = format!(
+            "{}: a watchdog acts in a drive that is fed and not spoken to, so that its supply was not away",
+            facts.in_words(trip)
+        );
+        return by_watchdog.then(|| Sentence::of(Likely, text).at(at));
     }
     // Its state was the same before: else it is told that it became another.
     let shown = body(connected).status.unwrap_or_default();
