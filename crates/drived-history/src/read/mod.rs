@@ -21,7 +21,7 @@ pub use self::{
     lines::{line_minutes, lines_at},
     parameters::parameters,
     records::{Filter, Found, records},
-    steps::{DAY_MS, pack_steps, steps, unpack_steps},
+    steps::{DAY_MS, QUARTER_MS, pack_steps, steps, unpack_steps},
     then::then,
 };
 use crate::{
