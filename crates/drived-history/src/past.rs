@@ -2,6 +2,7 @@
 
 use std::{
     path::PathBuf,
+    sync::Arc,
     time::{Duration, SystemTime},
 };
 
@@ -11,7 +12,11 @@ use drived_plant::plant::past::{
     RecordsView, StepsView, StoryView, ValueNameView, ValuesAsked, ValuesView,
 };
 
+use tokio::sync::Notify;
+
 use crate::{
+    listen::Clocks,
+    maintenance,
     quantity::{Quantity, TABLE},
     read::{self, Filter, History},
     record::Setting,
@@ -29,6 +34,9 @@ pub(crate) struct InFile {
     pub(crate) path: PathBuf,
     pub(crate) limits: Limits,
     pub(crate) inbox: Inbox,
+    pub(crate) clocks: Clocks,
+    /// Rings when something was seen to.
+    pub(crate) done: Arc<Notify>,
 }
 
 impl From<StoreError> for PastError {
@@ -276,6 +284,11 @@ impl Past for InFile {
 
     fn note(&self, read: ParameterRead) {
         self.inbox.setting(Setting { wall_ms: wall_ms(), read });
+    }
+
+    fn maintained(&self, drive: &str, part: &str, by: &str, note: Option<&str>) {
+        self.inbox.record(maintenance::done(self.clocks.now(), drive, part, by, note));
+        self.done.notify_one();
     }
 }
 

@@ -16,7 +16,7 @@ use std::{collections::BTreeSet, path::Path};
 use rusqlite::{Connection, OptionalExtension as _, params};
 
 pub use self::{
-    days::days,
+    days::{Ran, days, ran},
     frames::{Frame, frames},
     lines::{line_minutes, lines_at},
     parameters::parameters,
