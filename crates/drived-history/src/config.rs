@@ -8,6 +8,7 @@ use drived_face::{ConfigError, Site, Source};
 use crate::{
     forecast::Forecast,
     forward::{Forward, Target},
+    maintenance::Maintained,
     write::Limits,
 };
 
@@ -23,6 +24,8 @@ pub struct HistoryConfig {
     pub forecast: Forecast,
     /// Where it is sent on to; `None`: it stays here.
     pub forward: Option<Forward>,
+    /// What is to be seen to of its drives.
+    pub maintained: Vec<Maintained>,
 }
 
 /// What is said, while it is read.
@@ -37,6 +40,7 @@ pub struct Draft {
     megabytes: u32,
     forward: Option<Target>,
     forward_token: Option<PathBuf>,
+    maintained: Vec<Maintained>,
 }
 
 settings! {
@@ -59,6 +63,8 @@ settings! {
     forward: String = "nowhere", |to, said| to.forward = Some(said.parse().map_err(str::to_owned)?);
     /// the file of the token that it wants; beside the configuration unless the path is whole
     forward_token_file: PathBuf = "none", |to, said| to.forward_token = Some(said.clone());
+    /// what of a drive is to be seen to after so many hours of running or so many starts: `[{ drive = "pump", part = "bearings", hours = 20000 }]`, with `starts` instead or besides; it becomes an alarm, `drived alarms done NUMBER` has it counted anew, and what ran before the history began is not in it
+    maintenance: Vec<Maintained> = "nothing", |to, said| to.maintained = checked(said)?;
 }
 
 impl Default for Draft {
@@ -72,6 +78,7 @@ impl Default for Draft {
             megabytes: 2_048,
             forward: None,
             forward_token: None,
+            maintained: Vec::new(),
         }
     }
 }
@@ -90,17 +97,50 @@ impl HistoryConfig {
     pub fn read(source: Source<'_>, entry: &HistoryEntry, site: &Site<'_>) -> Result<Self, ConfigError> {
         let mut draft = Draft::default();
         entry.set(source, &mut draft)?;
+        let is_unknown = |one: &&Maintained| !site.drives().any(|drive| drive == one.drive);
+        if let Some(said) = &entry.maintenance
+            && let Some(one) = said.get_ref().iter().find(is_unknown)
+        {
+            return Err(source.error(said.span(), format!("no drive is called {:?}", one.drive)));
+        }
         Ok(Self::from(draft, source.file.parent(), site))
     }
 
     fn from(draft: Draft, beside: Option<&Path>, site: &Site<'_>) -> Self {
-        let Draft { is_on, file, polled_hours, minute_days, years, megabytes, forward, forward_token } =
-            draft;
+        let Draft {
+            is_on,
+            file,
+            polled_hours,
+            minute_days,
+            years,
+            megabytes,
+            forward,
+            forward_token,
+            maintained,
+        } = draft;
         let said = file.map(|file| beside.unwrap_or(Path::new("")).join(file));
         let file = said.or_else(|| site.state.folder.as_ref().map(|folder| folder.join(FILE)));
         let limits = Limits::of(polled_hours, minute_days, years, megabytes);
         let token = forward_token.map(|file| beside.unwrap_or(Path::new("")).join(file));
         let forward = forward.map(|target| Forward { target, token });
-        Self { file: file.filter(|_| is_on), limits, forecast: Forecast::of(site, &limits), forward }
+        let forecast = Forecast::of(site, &limits);
+        Self { file: file.filter(|_| is_on), limits, forecast, forward, maintained }
     }
+}
+
+/// What is to be maintained, each part of a drive once.
+fn checked(said: &[Maintained]) -> Result<Vec<Maintained>, String> {
+    for (place, one) in said.iter().enumerate() {
+        let name = format!("{:?} of {:?}", one.part, one.drive);
+        if one.part.trim().is_empty() || one.part.chars().count() > 60 {
+            return Err(format!("{name}: expected a part of 1 to 60 characters"));
+        }
+        if !matches!((one.hours, one.starts), (Some(1..), None | Some(1..)) | (None, Some(1..))) {
+            return Err(format!("{name}: expected hours or starts, of 1 or more"));
+        }
+        if said[..place].iter().any(|other| (&other.drive, &other.part) == (&one.drive, &one.part)) {
+            return Err(format!("{name} is there twice"));
+        }
+    }
+    Ok(said.to_vec())
 }

@@ -9,12 +9,16 @@ use drived_face::{
 };
 use drived_plant::plant::views::NoticeView;
 use serde_json::{Map, Value, json};
-use tokio::{sync::watch, task::JoinSet};
+use tokio::{
+    sync::{Notify, watch},
+    task::JoinSet,
+};
 
 use crate::{
     config::{HistoryConfig, HistoryEntry},
     forward,
     listen::{Clocks, Listening},
+    maintenance,
     past::InFile,
     write::{
         inbox::Inbox,
@@ -99,8 +103,11 @@ impl Configured for HistoryConfig {
                 format!("{} a day then, which wears an SD card", mebibytes(self.forecast.bytes_a_day)),
             ),
         ];
+        let maintained = (!self.maintained.is_empty()).then(|| {
+            ("maintenance", self.maintained.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+        });
         let sent = self.forward.as_ref().map(|forward| ("sent on", format!("to {}", forward.target)));
-        let rows = rows.into_iter().chain(sent).collect();
+        let rows = rows.into_iter().chain(maintained).chain(sent).collect();
         vec![Meaning { head: format!("history: in {}", file.display()), rows }]
     }
 
@@ -143,7 +150,8 @@ struct Recorder(Option<Recording>);
 struct Recording {
     plant: Plant,
     listening: Listening,
-    forwarding: Option<JoinSet<()>>,
+    /// What is sent on, and what is counted.
+    tasks: JoinSet<()>,
     inbox: Inbox,
     writing: Option<JoinHandle<()>>,
 }
@@ -152,18 +160,23 @@ impl Recorder {
     fn open(config: HistoryConfig, around: &Surroundings) -> Self {
         let Some(path) = config.file else { return Self(None) };
         let (inbox, clocks) = (Inbox::default(), Clocks::begin());
-        let past = InFile { path: path.clone(), limits: config.limits, inbox: inbox.clone() };
+        let done = Arc::new(Notify::new());
+        let limits = config.limits;
+        let past =
+            InFile { path: path.clone(), limits, inbox: inbox.clone(), clocks, done: Arc::clone(&done) };
         around.plant.set_past(Some(Arc::new(past)));
         let (health, seen) = watch::channel(Health::Opening);
         let listening = Listening::start(&around.plant, &inbox, clocks, seen);
         let clock = move || clocks.now();
-        let forwarding = config.forward.map(|forward| {
+        let mut tasks = JoinSet::new();
+        if let Some(forward) = config.forward {
             let (failing, seen) = watch::channel(None);
-            let mut tasks = JoinSet::new();
             tasks.spawn(forward::run(path.clone(), forward, inbox.clone(), failing));
             tasks.spawn(tell_forwarding(around.plant.clone(), seen));
-            tasks
-        });
+        }
+        let counted =
+            maintenance::count(path.clone(), config.maintained, around.plant.clone(), inbox.clone(), done);
+        tasks.spawn(counted);
         let writer =
             Writer { path, limits: config.limits, inbox: inbox.clone(), clock, health: health.clone() };
         let writing = writer.start();
@@ -171,7 +184,7 @@ impl Recorder {
             health.send_replace(Health::Failing(error.to_string()));
         }
         let plant = around.plant.clone();
-        Self(Some(Recording { plant, listening, forwarding, inbox, writing: writing.ok() }))
+        Self(Some(Recording { plant, listening, tasks, inbox, writing: writing.ok() }))
     }
 }
 
@@ -181,9 +194,9 @@ impl Open for Recorder {
 
     fn close(self: Box<Self>) -> Pin<Box<dyn Future<Output = ()> + Send>> {
         Box::pin(async move {
-            let Some(Recording { plant, listening, forwarding, inbox, writing }) = self.0 else { return };
+            let Some(Recording { plant, listening, tasks, inbox, writing }) = self.0 else { return };
             plant.set_past(None);
-            drop((listening, forwarding));
+            drop((listening, tasks));
             inbox.end();
             let joined = tokio::task::spawn_blocking(move || writing.map(JoinHandle::join));
             let _ = tokio::time::timeout(ENDED_WITHIN, joined).await;

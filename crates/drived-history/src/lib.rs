@@ -21,6 +21,7 @@ mod face;
 pub mod forecast;
 pub mod forward;
 mod listen;
+mod maintenance;
 mod past;
 pub mod quantity;
 pub mod read;

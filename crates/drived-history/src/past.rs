@@ -1,6 +1,10 @@
 //! The history as the faces ask it: each answer has a bound and can be given up, and the file is opened for each.
 
-use std::{path::PathBuf, time::SystemTime};
+use std::{
+    path::PathBuf,
+    sync::Arc,
+    time::{Duration, SystemTime},
+};
 
 use drived_plant::plant::past::{
     AT_ONCE, CELLS, CurveView, CurvesAsked, DayView, DaysAsked, FrameCurveView, FrameView, GivenUp, KeptView,
@@ -8,20 +12,31 @@ use drived_plant::plant::past::{
     RecordsView, StepsView, StoryView, ValueNameView, ValuesAsked, ValuesView,
 };
 
+use tokio::sync::Notify;
+
 use crate::{
+    listen::Clocks,
+    maintenance,
     quantity::{Quantity, TABLE},
     read::{self, Filter, History},
     record::Setting,
     store::StoreError,
     story,
-    write::{Limits, inbox::Inbox, tidy},
+    write::{Limits, archive::FLUSHED_EVERY_MS, inbox::Inbox, tidy},
 };
+
+/// Whoever asks for what has just happened waits at the most for this long for what was read then to be written; a disk that is slower leaves
+/// the rest out, as not known.
+const WRITTEN_WITHIN: Duration = Duration::from_millis(1_500);
 
 /// The past of a plant in this file, and the way into it.
 pub(crate) struct InFile {
     pub(crate) path: PathBuf,
     pub(crate) limits: Limits,
     pub(crate) inbox: Inbox,
+    pub(crate) clocks: Clocks,
+    /// Rings when something was seen to.
+    pub(crate) done: Arc<Notify>,
 }
 
 impl From<StoreError> for PastError {
@@ -261,12 +276,23 @@ impl Past for InFile {
     }
 
     fn story(&self, drive: &str, at_unix_ms: i64) -> Result<StoryView, PastError> {
+        if wall_ms() - at_unix_ms <= story::LOOKED_AFTER_MS + FLUSHED_EVERY_MS {
+            self.inbox.have_written(WRITTEN_WITHIN);
+        }
         Ok(story::tell(&self.open()?.0, drive, at_unix_ms)?)
     }
 
     fn note(&self, read: ParameterRead) {
-        let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        let wall_ms = i64::try_from(wall.as_millis()).unwrap_or(i64::MAX);
-        self.inbox.setting(Setting { wall_ms, read });
+        self.inbox.setting(Setting { wall_ms: wall_ms(), read });
     }
+
+    fn maintained(&self, drive: &str, part: &str, by: &str, note: Option<&str>) {
+        self.inbox.record(maintenance::done(self.clocks.now(), drive, part, by, note));
+        self.done.notify_one();
+    }
+}
+
+fn wall_ms() -> i64 {
+    let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(wall.as_millis()).unwrap_or(i64::MAX)
 }

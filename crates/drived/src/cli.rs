@@ -162,7 +162,7 @@ impl Command {
             #[cfg(feature = "history")]
             Self::History(args) => history::run(&args),
             #[cfg(feature = "history")]
-            Self::Why(args) => why::run(&args),
+            Self::Why(args) => why::run(&args).await,
             #[cfg(not(feature = "history"))]
             Self::History(_) | Self::Why(_) => Err(Failure::Input(drived_file::without("history"))),
         }

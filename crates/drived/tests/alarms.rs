@@ -15,6 +15,8 @@ use support::{File, Running, Sim, path, run};
 
 /// How long something may take to come true.
 const PATIENCE: Duration = Duration::from_secs(30);
+/// Hours and starts are counted once in a minute.
+const COUNTED: Duration = Duration::from_secs(120);
 
 struct Plant {
     sim: Sim,
@@ -25,10 +27,15 @@ struct Plant {
 
 impl Plant {
     fn new(name: &str) -> Self {
+        Self::with(name, "")
+    }
+
+    /// With more in its file.
+    fn with(name: &str, more: &str) -> Self {
         let sim = Sim::serve(name, &["atv312@1"]);
         let state = path(&format!("{name}-state"));
         let text = format!(
-            "state = \"{}\"\n[http]\nlisten = \"off\"\n[lines.bench]\nport = \"{},19200,8E1\"\n[[drives]]\n\
+            "state = \"{}\"\n[http]\nlisten = \"off\"\n{more}[lines.bench]\nport = \"{},19200,8E1\"\n[[drives]]\n\
              line = \"bench\"\ndrive = \"atv312@1\"\nname = \"pump\"\ncontrol = true\n",
             state.display(),
             sim.link()
@@ -54,7 +61,11 @@ impl Plant {
 
     /// The only alarm, once it is so.
     fn alarm_that(&self, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
-        let until = Instant::now() + PATIENCE;
+        self.alarm_within(PATIENCE, what, is_so)
+    }
+
+    fn alarm_within(&self, patience: Duration, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
+        let until = Instant::now() + patience;
         loop {
             let told = self.alarms(&["list"]);
             let alarms = told["alarms"].as_array().expect("a list");
@@ -110,6 +121,34 @@ fn a_standing_trip_is_one_alarm_with_its_note_after_the_daemon_was_killed_and_st
     }
     let (code, last) = daemon.interrupt();
     assert_eq!(code, Some(0), "{last}");
+}
+
+#[test]
+fn maintenance_is_an_alarm_after_so_many_starts_until_somebody_says_that_it_was_done() {
+    let plant = Plant::with(
+        "alarms-maintenance",
+        "[history]\nmaintenance = [{ drive = \"pump\", part = \"contactor\", starts = 2 }]\n",
+    );
+    let daemon = plant.daemon();
+    for _ in 0..2 {
+        assert_eq!(plant.alarms(&["list"])["alarms"], Value::Array(Vec::new()));
+        run(&["start", "pump", "--frequency", "20", "--socket", &plant.socket]).assert_done();
+        run(&["stop", "pump", "--socket", &plant.socket]).assert_done();
+    }
+    let due = plant.alarm_within(COUNTED, "it is due", |alarm| alarm["kind"] == "maintenance");
+    assert_eq!((&due["drive"], &due["state"]), (&"pump".into(), &"unacknowledged".into()), "{due}");
+    assert_eq!(due["text"], "maintenance is due: contactor, after 2 starts", "{due}");
+    let number = due["id"].to_string();
+    let done = plant.alarms(&["done", &number, "--note", "both contacts filed"]);
+    assert_eq!(done["acknowledged"]["note"], "both contacts filed", "{done}");
+    let until = Instant::now() + COUNTED;
+    while plant.alarms(&["list"])["alarms"] != Value::Array(Vec::new()) {
+        assert!(Instant::now() < until, "it is not over");
+    }
+    let told = run(&["history", "pump", "--config", plant.file.path()]);
+    assert!(told.assert_done().contains("maintenance done by"), "{}", told.out);
+    run(&["alarms", "done", &number, "--socket", &plant.socket]).assert_refused(2, "there is no alarm");
+    daemon.interrupt();
 }
 
 #[test]

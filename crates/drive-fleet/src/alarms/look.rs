@@ -129,6 +129,20 @@ impl Look {
         Self { drive: None, line: Some(line.to_owned()), there, seen: kinds }
     }
 
+    /// At what is to be seen to of a drive after so many hours or starts: what of it is due, each by its name and with why.
+    #[must_use]
+    pub fn at_maintenance(line: &str, drive: &str, due: &[(String, String)]) -> Self {
+        let due = due.iter();
+        let there =
+            due.map(|(part, why)| condition(AlarmKind::Maintenance, Some(part.clone()), Some(why.clone())));
+        Self {
+            drive: Some(drive.to_owned()),
+            line: Some(line.to_owned()),
+            there: there.collect(),
+            seen: vec![AlarmKind::Maintenance],
+        }
+    }
+
     /// At the program, with what is wrong with it, in words. What is not there is not so.
     #[must_use]
     pub fn at_program(wrong: &BTreeMap<AlarmKind, String>) -> Self {

@@ -23,17 +23,20 @@ pub enum AlarmKind {
     AuditLog,
     /// The history cannot be written: what happens now is not known later.
     History,
+    /// A drive has run for so long, or was started so often, that something of it is to be seen to.
+    Maintenance,
     /// The configuration could not be read again, or a reload has left a motor that may turn.
     Reload,
 }
 
 /// Those that are of no drive's own.
-const OTHERS: [AlarmKind; 6] = [
+const OTHERS: [AlarmKind; 7] = [
     AlarmKind::LineAway,
     AlarmKind::LineSilent,
     AlarmKind::LineFinding,
     AlarmKind::AuditLog,
     AlarmKind::History,
+    AlarmKind::Maintenance,
     AlarmKind::Reload,
 ];
 
@@ -89,6 +92,12 @@ impl AlarmKind {
                 "the history cannot be written, what happens now is not known later",
                 Severity::Warning,
                 "see whether its disk is full; the log of the program says why",
+            ),
+            Self::Maintenance => row(
+                "maintenance",
+                "maintenance is due",
+                Severity::Warning,
+                "have it done, and say so: drived alarms done NUMBER",
             ),
             Self::Reload => row(
                 "reload",

@@ -593,7 +593,14 @@ impl Supervisor {
     fn note_act(&mut self, job: Job) {
         let cause = match job {
             Job::Stop(_) => self.begin_attempt(),
-            Job::Withdraw => self.withdrawal.as_ref().map(|withdrawal| withdrawal.asker().cause()),
+            Job::Withdraw if self.may_withdrawal_stop() => {
+                self.withdrawal.as_ref().map(|withdrawal| withdrawal.asker().cause())
+            }
+            Job::Withdraw => {
+                // What the motor does is somebody else's doing already, or that of a stop of here.
+                self.acted.take_if(|acted| !matches!(acted.job, Job::Stop(_) | Job::Withdraw));
+                return;
+            }
             Job::Start(_) | Job::ResetFaults | Job::Release => self.active.as_ref().map(Active::cause),
             _ => return,
         };

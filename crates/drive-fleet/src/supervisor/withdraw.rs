@@ -3,7 +3,9 @@
 
 use std::time::Duration;
 
-use drive_core::{Command, Error, ErrorKind, Lack, Refusal, Result, StopMode, Verdict, Withdrawn};
+use drive_core::{
+    Command, Control, Error, ErrorKind, Lack, Motion, Refusal, Result, StopMode, Verdict, Withdrawn,
+};
 use tokio::time::Instant;
 
 use super::{Asker, Job, Supervisor, stopping::REPEAT, verdict::status_of};
@@ -102,6 +104,16 @@ impl Supervisor {
             (false, lack) if self.settings.accept_resume.contains(&lack) => {}
             (false, lack) => self.withdraw(now, by(lack)),
         }
+    }
+
+    /// Whether the withdrawal that is sent now may be what stops the motor: not where its output is cut, somebody else commands it, or it is
+    /// on its way down.
+    pub(super) fn may_withdrawal_stop(&self) -> bool {
+        let is_cut = self.suspended.is_some_and(|(lacks, _)| lacks == Lack::Output);
+        let obeys = self.status.as_ref().is_some_and(|status| {
+            status.value.motion == Motion::Driven && matches!(status.value.control, None | Some(Control::Bus))
+        });
+        obeys && !is_cut
     }
 
     /// Whether a stop ends the run command anyhow, or a start is under way that has its own verdict.

@@ -97,6 +97,26 @@ fn day(
     }))
 }
 
+/// For how long a drive ran, and how often it was seen to begin to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ran {
+    pub running_ms: i64,
+    pub starts: u64,
+    /// Of when something was known last, and a millisecond more.
+    pub until: i64,
+}
+
+/// For how long a drive ran between two moments, as far as it is known.
+///
+/// # Errors
+/// It cannot be read.
+pub fn ran(connection: &Connection, drive: &str, from: i64, to: i64) -> Result<Ran, StoreError> {
+    let states = Held::of(connection, drive, Quantity::STATE, from, to)?;
+    let running_ms = states.in_ms.get(&Quantity::RUNNING).copied().unwrap_or_default();
+    let starts = states.begun.get(&Quantity::RUNNING).copied().unwrap_or_default();
+    Ok(Ran { running_ms, starts, until: states.until })
+}
+
 /// For how long a word held, and how often it was seen to begin.
 #[derive(Default)]
 struct Held {

@@ -16,12 +16,12 @@ use std::{collections::BTreeSet, path::Path};
 use rusqlite::{Connection, OptionalExtension as _, params};
 
 pub use self::{
-    days::days,
+    days::{Ran, days, ran},
     frames::{Frame, frames},
     lines::{line_minutes, lines_at},
     parameters::parameters,
     records::{Filter, Found, records},
-    steps::{DAY_MS, pack_steps, steps, unpack_steps},
+    steps::{DAY_MS, QUARTER_MS, pack_steps, steps, unpack_steps},
     then::then,
 };
 use crate::{

@@ -14,6 +14,8 @@ use crate::{
 
 const MINUTE_MS: i64 = 60_000;
 const HOUR_MS: i64 = 3_600_000;
+/// Steps of which those of a season are drawn.
+pub const QUARTER_MS: i64 = 15 * MINUTE_MS;
 /// No pack of minutes is longer.
 pub const DAY_MS: i64 = 24 * HOUR_MS;
 
@@ -58,7 +60,29 @@ pub fn steps(
                 from,
                 to.min(minutes_from.saturating_sub(1)),
             )?;
-            add_minutes(connection, &mut steps, source, quantity, from.max(minutes_from), to)?;
+            let quarters_from = match length_ms % QUARTER_MS {
+                0 => oldest_quarter(connection, source, quantity)?.unwrap_or(i64::MAX).max(minutes_from),
+                _ => i64::MAX,
+            };
+            let minutes_to = to.min(quarters_from.saturating_sub(1));
+            add_packs(
+                connection,
+                &mut steps,
+                Packs::Minutes,
+                source,
+                quantity,
+                from.max(minutes_from),
+                minutes_to,
+            )?;
+            add_packs(
+                connection,
+                &mut steps,
+                Packs::Quarters,
+                source,
+                quantity,
+                from.max(quarters_from),
+                to,
+            )?;
             for (_, start, end, data) in chunks(connection, source, from, to)? {
                 if let Some(piece) = piece_of(quantity, start, end, &data)?.between(from, to) {
                     steps.add(piece);
@@ -101,6 +125,24 @@ fn oldest_minute(
     Ok(oldest.map(|start| start - start.rem_euclid(HOUR_MS)))
 }
 
+/// When the oldest quarter of an hour of a quantity begins: from there on all are there.
+fn oldest_quarter(
+    connection: &Connection,
+    source: i64,
+    quantity: Quantity,
+) -> Result<Option<i64>, StoreError> {
+    let mut find =
+        connection.prepare_cached("SELECT min(start_ms) FROM quarter WHERE source = ?1 AND quantity = ?2")?;
+    Ok(find.query_row(params![source, quantity.0], |row| row.get(0))?)
+}
+
+/// Packs of days, in which steps of one length are.
+#[derive(Clone, Copy)]
+enum Packs {
+    Minutes,
+    Quarters,
+}
+
 fn add_hours(
     connection: &Connection,
     steps: &mut Steps,
@@ -140,25 +182,31 @@ fn add_hours(
     Ok(())
 }
 
-fn add_minutes(
+fn add_packs(
     connection: &Connection,
     steps: &mut Steps,
+    packs: Packs,
     source: i64,
     quantity: Quantity,
     from: i64,
     to: i64,
 ) -> Result<(), StoreError> {
-    let mut find = connection.prepare_cached(
-        "SELECT start_ms, data FROM minute WHERE source = ?1 AND quantity = ?2 AND start_ms BETWEEN ?3 AND ?4",
-    )?;
+    if from > to {
+        return Ok(());
+    }
+    let (table, length_ms) = match packs {
+        Packs::Minutes => ("minute", MINUTE_MS),
+        Packs::Quarters => ("quarter", QUARTER_MS),
+    };
+    let mut find = connection.prepare_cached(&format!(
+        "SELECT start_ms, data FROM {table} WHERE source = ?1 AND quantity = ?2 AND start_ms BETWEEN ?3 AND ?4"
+    ))?;
     let earliest = from.saturating_sub(DAY_MS);
-    let rows = find.query_map(params![source, quantity.0, earliest, to], |row| {
-        Ok((row.get::<_, i64>(0)?, row.get::<_, Vec<u8>>(1)?))
-    })?;
-    for row in rows {
-        let (start, data) = row?;
-        let minutes = unpack_steps(MINUTE_MS, start, &data)?;
-        steps.add_steps(minutes.filter(|(at, _)| (from..=to).contains(at)));
+    let mut rows = find.query(params![source, quantity.0, earliest, to])?;
+    while let Some(row) = rows.next()? {
+        let packed = row.get_ref(1)?.as_blob().map_err(rusqlite::Error::from)?;
+        let all = unpack_steps(length_ms, row.get(0)?, packed)?;
+        steps.add_steps(all.filter(|(at, _)| (from..=to).contains(at)));
     }
     Ok(())
 }

@@ -110,15 +110,18 @@ pub fn open_to_read(path: &Path) -> Result<Connection, StoreError> {
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let connection = Connection::open_with_flags(path, flags)?;
     connection.busy_timeout(PATIENCE)?;
-    match check(&connection, path)? {
-        0 => Err(StoreError::Missing(path.to_owned())),
-        // It is read as it stands until a daemon brings it to this version.
-        2 => {
-            connection.execute_batch(schema::CHUNKS_OF_SECOND)?;
-            Ok(connection)
-        }
-        _ => Ok(connection),
+    let version = check(&connection, path)?;
+    if version == 0 {
+        return Err(StoreError::Missing(path.to_owned()));
     }
+    // It is read as it stands until a daemon brings it to this version.
+    if version < 3 {
+        connection.execute_batch(schema::CHUNKS_OF_SECOND)?;
+    }
+    if version < 4 {
+        connection.execute_batch(schema::QUARTERS_OF_NONE)?;
+    }
+    Ok(connection)
 }
 
 /// Puts a file aside that is found damaged while it is written; the store is closed first.

@@ -8,7 +8,7 @@ use crate::quantity::TABLE;
 pub const APPLICATION: i32 = 0x6472_7664;
 
 /// One step for each version: the tables of the first, and what each later one changed.
-const STEPS: &[&str] = &[FIRST, SECOND, THIRD];
+const STEPS: &[&str] = &[FIRST, SECOND, THIRD, FOURTH];
 
 pub(crate) const FIRST: &str = "
 CREATE TABLE run (
@@ -179,6 +179,20 @@ const THIRD: &str = "
 ALTER TABLE chunk ADD COLUMN form INTEGER NOT NULL DEFAULT 1;
 ";
 
+/// Quarters of an hour: of a season they are read in a fifteenth of what its minutes are.
+const FOURTH: &str = "
+CREATE TABLE quarter (
+    source INTEGER NOT NULL,
+    quantity INTEGER NOT NULL,
+    start_ms INTEGER NOT NULL,
+    data BLOB NOT NULL,
+    PRIMARY KEY (source, quantity, start_ms)
+) WITHOUT ROWID;
+";
+
+/// How a file of an older version is read as one of the fourth, by a reader who changes nothing in it.
+pub(crate) const QUARTERS_OF_NONE: &str =
+    "CREATE TEMP TABLE quarter (source INTEGER, quantity INTEGER, start_ms INTEGER, data BLOB)";
 /// How chunks of the second version are read as those of the third, by a reader who changes nothing in the file.
 pub(crate) const CHUNKS_OF_SECOND: &str =
     "CREATE TEMP VIEW chunk AS SELECT id, start_ms, end_ms, data, 1 AS form FROM main.chunk";

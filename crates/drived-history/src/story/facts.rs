@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use drived_plant::plant::past::RecordView;
 use rusqlite::Connection;
-use serde::Deserialize;
 
+use super::body::{Body, Cause, OfOne, OfSeveral, body};
 use crate::{
     quantity::Quantity,
     read::{Filter, Found, bounds, line_minutes, pieces, records},
@@ -13,9 +13,9 @@ use crate::{
 };
 
 /// So long before a moment it is looked,
-pub(super) const BEFORE_MS: i64 = 10 * 60_000;
+const BEFORE_MS: i64 = 10 * 60_000;
 /// and so long after.
-pub(super) const AFTER_MS: i64 = 10 * 60_000;
+pub const AFTER_MS: i64 = 10 * 60_000;
 /// So many records at the most: a plant that tells more in twenty minutes is told of in part, and it is said.
 const RECORDS: usize = 20_000;
 
@@ -30,7 +30,9 @@ pub(super) struct Facts {
     pub(super) is_cut: bool,
     /// How much of the time something is known of the drive, from 0 to 1.
     pub(super) known: f64,
-    /// Times in which nothing is, longer than a few polls.
+    /// When it was heard, by its values.
+    spans: Vec<(i64, i64)>,
+    /// Times in which nothing is known, longer than a few polls.
     pub(super) gaps: Vec<(i64, i64)>,
     /// What its inputs showed, from each of these moments on,
     pub(super) inputs: Vec<(i64, i64)>,
@@ -50,6 +52,19 @@ const TOLD_AGAIN_MS: i64 = 60_000;
 const GAP_MS: i64 = 5_000;
 /// What a drive shows when it is seen again is told of it within this time.
 const SEEN_AGAIN_MS: i64 = 3_000;
+/// Events that tell what was read of a drive at their moment. Behind a kill they are there, and the values of the last minute are not.
+const SHOWN: [&str; 10] = [
+    "connected",
+    "identified",
+    "state_changed",
+    "tripped",
+    "fault_cleared",
+    "control_taken",
+    "control_returned",
+    "output_blocked",
+    "reference_taken",
+    "command_overridden",
+];
 /// So many other drives of a line are looked at, whether they were heard.
 const NEIGHBOURS: usize = 64;
 
@@ -64,17 +79,8 @@ impl Facts {
         let line = records.iter().filter(of_drive).find_map(|found| found.line.clone());
         let spans = heard(connection, drive, from, to)?;
         let known: i64 = spans.iter().map(|(start, end)| end - start).sum();
-        let mut gaps = Vec::new();
-        let mut until = from;
-        for (start, end) in spans {
-            if start - until > GAP_MS {
-                gaps.push((until, start));
-            }
-            until = until.max(end);
-        }
-        if to - until > GAP_MS {
-            gaps.push((until, to));
-        }
+        let shown = records.iter().filter(of_drive).filter(|found| SHOWN.contains(&&*found.what));
+        let gaps = gaps(&spans, shown.map(|found| found.time_unix_ms), from, to);
         let known = known as f64 / (to - from).max(1) as f64;
         let read = pieces(connection, drive, Quantity::INPUTS, from, to)?;
         let points = read.iter().flat_map(|piece| &piece.points);
@@ -99,6 +105,7 @@ impl Facts {
             records,
             is_cut,
             known,
+            spans,
             gaps,
             inputs,
             inputs_known,
@@ -123,6 +130,11 @@ impl Facts {
     /// The last time in which nothing was known of the drive, of those that ended no longer than a moment before it was seen again.
     pub(super) fn gap_before(&self, at: i64) -> Option<(i64, i64)> {
         self.gaps.iter().rev().copied().find(|(start, end)| *start < at && at <= *end + SEEN_AGAIN_MS)
+    }
+
+    /// Whether it was heard all the time between two moments.
+    pub(super) fn is_heard(&self, from: i64, to: i64) -> bool {
+        self.spans.iter().any(|(start, end)| *start <= from && to <= *end)
     }
 
     /// Drives of its line that were heard all the time between two moments.
@@ -215,6 +227,8 @@ impl Facts {
         let ends_run = matches!(from.as_deref(), Some("running" | "stopping" | "quick_stop"));
         let can = match &*found.what {
             "fault_cleared" => policy == "on_fault",
+            // Where the output was cut there was no run to be ended.
+            "state_changed" if policy == "output_blocked" => false,
             "state_changed" => ends_run || acted(),
             _ => true,
         };
@@ -253,6 +267,21 @@ impl Facts {
     }
 }
 
+/// The times between two moments in which nothing was read of a drive, as far as they are told: neither a value nor what an event tells.
+fn gaps(spans: &[(i64, i64)], shown: impl Iterator<Item = i64>, from: i64, to: i64) -> Vec<(i64, i64)> {
+    let mut known: Vec<(i64, i64)> = spans.iter().copied().chain(shown.map(|at| (at, at))).collect();
+    known.push((to, to));
+    known.sort_unstable();
+    let (mut gaps, mut until) = (Vec::new(), from);
+    for (start, end) in known {
+        if start - until > GAP_MS {
+            gaps.push((until, start));
+        }
+        until = until.max(end);
+    }
+    gaps
+}
+
 /// When something began: a loss with the silence, and not when patience was over.
 pub(super) fn begins(found: &RecordView) -> i64 {
     let silent = if found.what == "lost" { body(found).silent_for_ms.unwrap_or_default() } else { 0 };
@@ -280,83 +309,6 @@ fn known_spans(points: &[crate::column::Point]) -> Vec<(i64, i64)> {
         }
     }
     spans
-}
-
-/// A command for several drives, as far as it is looked at here.
-#[derive(Debug, Deserialize)]
-struct OfSeveral {
-    #[serde(default)]
-    drives: Vec<OfOne>,
-}
-
-/// What became of it at one of them.
-#[derive(Debug, Deserialize)]
-pub(super) struct OfOne {
-    pub(super) drive: Option<String>,
-    pub(super) outcome: String,
-}
-
-/// An event as far as it is looked at here.
-#[derive(Debug, Default, Deserialize)]
-pub(super) struct Body {
-    #[serde(default)]
-    pub(super) cause: Option<Cause>,
-    #[serde(default)]
-    pub(super) from: Option<String>,
-    #[serde(default)]
-    pub(super) to: Option<String>,
-    #[serde(default)]
-    pub(super) fault: Option<Fault>,
-    #[serde(default)]
-    pub(super) words: Vec<Word>,
-    #[serde(default)]
-    pub(super) last_known_unix_ms: Option<i64>,
-    #[serde(default)]
-    pub(super) since_unix_ms: Option<i64>,
-    /// For how long a lost drive had been silent.
-    #[serde(default)]
-    pub(super) silent_for_ms: Option<u64>,
-    /// How many records could not be kept.
-    #[serde(default)]
-    pub(super) records: Option<u64>,
-    #[serde(default)]
-    pub(super) outcome: Option<String>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(tag = "by", rename_all = "snake_case")]
-pub(super) enum Cause {
-    Command {
-        commander: String,
-        #[serde(default)]
-        door: Option<String>,
-    },
-    Policy {
-        policy: String,
-    },
-    Drive,
-    Found,
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Fault {
-    #[serde(default)]
-    pub(super) by_watchdog: bool,
-    #[serde(default)]
-    pub(super) found: bool,
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Word {
-    pub(super) code: String,
-    pub(super) value: u16,
-    #[serde(default)]
-    pub(super) before: Option<u16>,
-}
-
-/// What the API told of it; nothing where that was not kept or is of another kind.
-pub(super) fn body(found: &RecordView) -> Body {
-    found.body.as_ref().and_then(|body| serde_json::from_str(body.get()).ok()).unwrap_or_default()
 }
 
 /// A time as a person says it.

@@ -1,5 +1,7 @@
 //! What the faces ask, on a file whose story is known: curves, moments, days, records, and who gives up.
 
+use std::sync::Arc;
+
 use drived_config::testing::Folder;
 use drived_plant::plant::past::{
     CurvesAsked, DaysAsked, GivenUp, IsView, Past as _, PastError, RecordsAsked, ValuesAsked,
@@ -7,6 +9,7 @@ use drived_plant::plant::past::{
 
 use super::{BEGIN_MS, Pump, event, moment};
 use crate::{
+    listen::Clocks,
     past::InFile,
     quantity::Quantity,
     record::{LineMinute, Record},
@@ -76,7 +79,8 @@ fn lived(folder: &Folder) -> (InFile, Store) {
     archive.record(told(300, "a", "tripped", "tripped: 18 ObF: DC bus overvoltage"));
     archive.end_run(&mut store.connection, moment(7_200_000)).unwrap();
     while tidy::compact(&mut store.connection, i64::MAX / 2).unwrap() {}
-    (InFile { path, limits: Limits::default(), inbox: Inbox::default() }, store)
+    let (inbox, clocks, done) = (Inbox::default(), Clocks::begin(), Arc::default());
+    (InFile { path, limits: Limits::default(), inbox, clocks, done }, store)
 }
 
 fn curves(every_ms: i64) -> CurvesAsked {

@@ -3,21 +3,22 @@
 use std::{fs, os::unix::fs::PermissionsExt as _, time::Duration};
 
 use drived_config::testing::Folder;
-use drived_plant::plant::past::{ParameterRead, RecordView};
+use drived_plant::plant::past::{ParameterRead, Past, RecordView};
 use rusqlite::Connection;
 use tokio::sync::watch;
 
 use super::{BEGIN_MS, Pump, event, moment};
 use crate::{
-    quantity::Quantity,
-    read::{Filter, History, records},
+    quantity::{Quantity, Set},
+    read::{self, Filter, History, records},
     record::{Moment, Setting},
     store::{self, StoreError, schema},
+    tracker::Tracker,
     write::{
         Limits,
         age::{self, Lived},
         archive::Archive,
-        inbox::{Batch, Inbox, Lost},
+        inbox::{Batch, Inbox, Lost, Shown},
         tidy,
         writer::{Health, Writer},
     },
@@ -343,6 +344,32 @@ async fn a_folder_that_cannot_be_written_is_told_and_the_writer_goes_on_by_itsel
     thread.join().unwrap();
     let history = History::open(&path).unwrap();
     assert_eq!(words(&history.0), ["began", "tripped", "ended"]);
+}
+
+#[tokio::test]
+async fn what_was_read_within_the_minute_is_there_for_whoever_asks() {
+    let folder = Folder::new("history-live");
+    let path = folder.file("history.sqlite");
+    let (inbox, mut health, thread) = writer(path.clone());
+    becomes(&mut health, |health| *health == Health::Writing).await;
+    let mut tracker = Tracker::default();
+    for at in [100, 1_100, 2_100] {
+        let seen = tracker.see(at, 3_000, &[(Quantity::STATE, 3)]);
+        let shown = seen.map(|seen| Shown { drive: "pump".into(), set: Set::Status, seen });
+        inbox.show(shown.unwrap()).unwrap();
+    }
+    let limits = Limits::default();
+    let (clocks, done) = (crate::listen::Clocks::begin(), std::sync::Arc::default());
+    let past = crate::past::InFile { path: path.clone(), limits, inbox: inbox.clone(), clocks, done };
+    let asked = tokio::task::spawn_blocking(move || Past::story(&past, "pump", i64::MAX / 4));
+    asked.await.unwrap().unwrap();
+    let known =
+        read::pieces(&History::open(&path).unwrap().0, "pump", Quantity::STATE, BEGIN_MS, i64::MAX / 4);
+    assert_eq!(known.unwrap().len(), 1, "the writer has not been ended, and its minute is not over");
+    inbox.end();
+    thread.join().unwrap();
+    // Behind its end nobody is waited for: this would hang for three seconds, and tell nothing.
+    assert_eq!(words(&History::open(&path).unwrap().0), ["began", "ended"]);
 }
 
 #[tokio::test]

@@ -36,6 +36,8 @@ pub struct Batch {
     /// How far was sent on, by where to.
     pub sent: BTreeMap<String, Place>,
     pub lost: Lost,
+    /// How often somebody has asked for what waits to be written, since the beginning.
+    pub asked: u64,
     pub is_end: bool,
 }
 
@@ -67,6 +69,9 @@ pub struct Inbox(Arc<Inner>);
 struct Inner {
     waiting: Mutex<Batch>,
     rings: Condvar,
+    /// Which of those who asked have what they asked for.
+    written: Mutex<u64>,
+    is_written: Condvar,
 }
 
 /// It was not taken, and is counted as lost.
@@ -121,6 +126,23 @@ impl Inbox {
         self.lock().sent.insert(target, place);
     }
 
+    /// Has written what waits, and waits for that, at the most for this long: values wait for up to a minute, and who asks is not to.
+    pub fn have_written(&self, patience: Duration) {
+        let mut waiting = self.lock();
+        waiting.asked += 1;
+        let asked = waiting.asked;
+        self.0.rings.notify_one();
+        drop(waiting);
+        let written = self.0.written.lock().unwrap_or_else(PoisonError::into_inner);
+        drop(self.0.is_written.wait_timeout_while(written, patience, |written| *written < asked));
+    }
+
+    /// What was asked for up to here is written, or cannot be now.
+    pub fn written(&self, asked: u64) {
+        *self.0.written.lock().unwrap_or_else(PoisonError::into_inner) = asked;
+        self.0.is_written.notify_all();
+    }
+
     /// Nothing comes any more.
     pub fn end(&self) {
         self.lock().is_end = true;
@@ -133,8 +155,8 @@ impl Inbox {
         let is_quiet = |waiting: &mut Batch| waiting.records.is_empty() && !waiting.is_end;
         let waited = self.0.rings.wait_timeout_while(self.lock(), patience, is_quiet);
         let (mut waiting, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        let is_end = waiting.is_end;
-        Batch { is_end, ..std::mem::replace(&mut *waiting, Batch { is_end, ..Batch::default() }) }
+        let (is_end, asked) = (waiting.is_end, waiting.asked);
+        std::mem::replace(&mut *waiting, Batch { is_end, asked, ..Batch::default() })
     }
 
     /// Lets what comes wait together for this long, unless nothing comes any more.

@@ -6,6 +6,7 @@ mod changes;
 pub mod frames;
 pub mod inbox;
 mod limits;
+mod packs;
 pub mod tidy;
 pub mod writer;
 

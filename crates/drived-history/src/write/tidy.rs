@@ -5,14 +5,14 @@ use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 use super::{
     Limits,
     age::{self, Lived},
-    changes,
+    changes, packs,
 };
 use crate::{
     chunk::{Chunk, Packed},
     column::pack,
     curve::{Piece, Step, Steps, joined},
     quantity::{Quantity, TABLE},
-    read::{DAY_MS, SOURCE_BITS, pack_steps, unpack_steps},
+    read::{DAY_MS, SOURCE_BITS, pack_steps},
     store::StoreError,
 };
 
@@ -138,15 +138,9 @@ impl Hour {
         if !quantity.is_number() {
             return Ok(());
         }
-        let (mut minutes, mut hours) = (Steps::of(MINUTE_MS), Steps::of(HOUR_MS));
-        minutes.add(piece.clone());
+        let mut hours = Steps::of(HOUR_MS);
+        packs::keep(transaction, source, quantity, piece.clone())?;
         hours.add(piece);
-        let minutes: Vec<(i64, Step)> = minutes.all.into_iter().collect();
-        for of_day in
-            minutes.chunk_by(|(one, _), (other, _)| one.div_euclid(DAY_MS) == other.div_euclid(DAY_MS))
-        {
-            keep_minutes(transaction, source, quantity, of_day)?;
-        }
         for (start, step) in hours.all {
             transaction
                 .prepare_cached(
@@ -170,39 +164,6 @@ impl Hour {
         }
         Ok(())
     }
-}
-
-/// Keeps minutes of one day, in one pack with those of the day before them: of a quarter of a year it is read in a few large parts.
-fn keep_minutes(
-    transaction: &Transaction<'_>,
-    source: i64,
-    quantity: Quantity,
-    minutes: &[(i64, Step)],
-) -> Result<(), StoreError> {
-    let Some((first, _)) = minutes.first() else { return Ok(()) };
-    let day = first - first.rem_euclid(DAY_MS);
-    let before: Option<(i64, i64, Vec<u8>)> = transaction
-        .prepare_cached(
-            "SELECT id, start_ms, data FROM minute WHERE source = ?1 AND quantity = ?2 AND start_ms BETWEEN ?3 AND ?4
-             ORDER BY start_ms DESC LIMIT 1",
-        )?
-        .query_row(params![source, quantity.0, day, first], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
-        .optional()?;
-    if let Some((id, start, data)) = before {
-        let mut all: Vec<(i64, Step)> = unpack_steps(MINUTE_MS, start, &data)?.collect();
-        // Where the clock was set back they stand beside it.
-        if all.last().is_none_or(|(last, _)| last <= first) {
-            all.extend_from_slice(minutes);
-            transaction
-                .prepare_cached("UPDATE minute SET data = ?2 WHERE id = ?1")?
-                .execute(params![id, pack_steps(MINUTE_MS, start, &all)])?;
-            return Ok(());
-        }
-    }
-    transaction
-        .prepare_cached("INSERT INTO minute (source, quantity, start_ms, data) VALUES (?1, ?2, ?3, ?4)")?
-        .execute(params![source, quantity.0, first, pack_steps(MINUTE_MS, *first, minutes)])?;
-    Ok(())
 }
 
 /// Parts of a piece that are no longer than a block may be.
@@ -277,7 +238,9 @@ fn trim_largest(connection: &Connection) -> Result<usize, StoreError> {
         return Ok(gone);
     }
     let mut gone = 0;
-    for (table, key) in [("hours", "start_ms"), ("hour", "start_ms"), ("change", "at_ms")] {
+    for (table, key) in
+        [("quarter", "start_ms"), ("hours", "start_ms"), ("hour", "start_ms"), ("change", "at_ms")]
+    {
         gone += connection.execute(
             &format!(
                 "DELETE FROM {table} WHERE (source, quantity, {key}) IN
@@ -297,6 +260,8 @@ fn trim_series(connection: &mut Connection, now: Lived, limits: &Limits) -> Resu
     if let Some(before) = age::all_younger_from(connection, now, limits.minutes_ms)? {
         connection.execute("DELETE FROM line_minute WHERE wall_ms < ?1", [before])?;
     }
+    // A pack is as old as its first quarter of an hour.
+    let quarters_before = age::all_younger_from(connection, now, limits.minutes_ms + DAY_MS)?;
     let before = age::all_younger_from(connection, now, limits.years_ms)?;
     if let Some(before) = before {
         connection.execute("DELETE FROM parameter WHERE last_ms < ?1", [before])?;
@@ -310,6 +275,13 @@ fn trim_series(connection: &mut Connection, now: Lived, limits: &Limits) -> Resu
     for source in sources {
         let transaction = connection.transaction()?;
         for (number, _) in (0_u32..).zip(TABLE) {
+            if let Some(before) = quarters_before {
+                transaction
+                    .prepare_cached(
+                        "DELETE FROM quarter WHERE source = ?1 AND quantity = ?2 AND start_ms < ?3",
+                    )?
+                    .execute(params![source, number, before])?;
+            }
             if let Some(before) = before {
                 transaction
                     .prepare_cached("DELETE FROM hour WHERE source = ?1 AND quantity = ?2 AND start_ms < ?3")?

@@ -24,6 +24,8 @@ use crate::{
 const LOOK: Duration = Duration::from_millis(500);
 /// Before a file that cannot be written is tried again.
 const TRIED_AGAIN: Duration = Duration::from_secs(2);
+/// Values that somebody asks for are not written more often than this.
+const ASKED_EVERY_MS: i64 = 2_000;
 /// For so long at a time the file is tidied before anything else is looked at.
 const TIDIED: Duration = Duration::from_millis(200);
 
@@ -66,29 +68,47 @@ struct Work<C> {
     /// It is not tried again before somebody does something about the file.
     is_given_up: bool,
     has_to_tidy: bool,
+    /// How often somebody had asked for what waits when that was written last, and when.
+    asked: u64,
+    asked_at: i64,
 }
 
 impl<C: Fn() -> Moment> Work<C> {
     fn new(writer: Writer<C>) -> Self {
         let archive = Archive::begin((writer.clock)());
-        Self { writer, archive, store: None, tried: None, is_given_up: false, has_to_tidy: true }
+        Self {
+            writer,
+            archive,
+            store: None,
+            tried: None,
+            is_given_up: false,
+            has_to_tidy: true,
+            asked: 0,
+            asked_at: i64::MIN / 2,
+        }
     }
 
     fn run(mut self) {
         loop {
             let began = Instant::now();
             let batch = self.writer.inbox.take(LOOK);
-            let (now, is_end) = ((self.writer.clock)(), batch.is_end);
+            let (now, is_end, asked) = ((self.writer.clock)(), batch.is_end, batch.asked);
             self.archive.take(batch, now);
             self.archive.look_at_clock(now);
-            if is_end || self.archive.is_due(now) {
+            let is_asked = asked != self.asked && now.steady_ms - self.asked_at >= ASKED_EVERY_MS;
+            if is_end || is_asked || self.archive.is_due(now) {
                 self.archive.close(now);
                 self.has_to_tidy = true;
+                self.asked_at = now.steady_ms;
             }
             let may_try = self.tried.is_none_or(|tried| tried.elapsed() >= TRIED_AGAIN) || is_end;
             if may_try && !self.is_given_up {
                 let worked = self.work(now, is_end);
                 self.tell(worked);
+            }
+            if asked != self.asked {
+                self.asked = asked;
+                self.writer.inbox.written(asked);
             }
             if is_end {
                 return;

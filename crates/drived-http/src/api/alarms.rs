@@ -38,6 +38,14 @@ pub(super) struct Shelve {
     why: String,
 }
 
+/// What an alarm of maintenance asks for was done.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct Done {
+    /// What is to be remembered of it, 500 characters at most.
+    note: Option<String>,
+}
+
 /// Nothing besides.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -75,6 +83,15 @@ pub(super) async fn unshelve(
     act(&plant, &caller, &id, &AlarmAct::Unshelve)
 }
 
+pub(super) async fn done(
+    State(plant): State<Plant>,
+    By(caller): By,
+    Named(id): Named,
+    Sent(Done { note }): Sent<Done>,
+) -> Result<Response, Problem> {
+    act(&plant, &caller, &id, &AlarmAct::Done { note })
+}
+
 fn act(plant: &Plant, caller: &Caller, id: &str, act: &AlarmAct) -> Result<Response, Problem> {
     let done = plant.act_on_alarm(caller, number(id)?, act);
     done.map(|alarm| fresh(&alarm)).map_err(|rejected| problem(caller, &rejected))
@@ -89,7 +106,10 @@ fn problem(caller: &Caller, rejected: &AlarmRejected) -> Problem {
         AlarmRejected::CameAgain | AlarmRejected::Refused(AlarmRefused::OfMotion) => {
             Problem::refused_as(rejected.reason(), detail)
         }
-        AlarmRejected::Refused(_) => Problem::new(StatusCode::UNPROCESSABLE_ENTITY, detail),
+        AlarmRejected::NotKept => Problem::not_found(detail),
+        AlarmRejected::NoMaintenance | AlarmRejected::Refused(_) => {
+            Problem::new(StatusCode::UNPROCESSABLE_ENTITY, detail)
+        }
     }
 }
 

@@ -10,7 +10,7 @@ use drive_fleet::alarms::AlarmView;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 
 use super::{
-    alarms::{self, Acknowledge, Shelve, Unshelve},
+    alarms::{self, Acknowledge, Done, Shelve, Unshelve},
     capture, command, demo, health,
     parameter::{self, NewValue},
     past, read, reload,
@@ -590,6 +590,11 @@ fn commands() -> Vec<Route> {
             "/api/v1/alarms/{id}/unshelve",
             alarms::unshelve,
             "Takes an alarm back from where it was put aside",
+        ),
+        Route::of_alarm::<_, _, Done>(
+            "/api/v1/alarms/{id}/done",
+            alarms::done,
+            "Says that what an alarm of maintenance asks for was done: it is counted from now on",
         ),
         Route::stop::<_, _, Stop>("/api/v1/stop", command::stop_all, "Stops every drive"),
     ]

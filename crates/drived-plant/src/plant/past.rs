@@ -83,6 +83,9 @@ pub trait Past: Send + Sync {
 
     /// Keeps what was read of a parameter. It waits for nothing.
     fn note(&self, read: ParameterRead);
+
+    /// Keeps that something was seen to of a drive, and by whom: its hours and starts count from now on. It waits for nothing.
+    fn maintained(&self, drive: &str, part: &str, by: &str, note: Option<&str>);
 }
 
 /// Whether somebody still waits for an answer. Cheap to clone.

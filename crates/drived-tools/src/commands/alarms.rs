@@ -49,6 +49,17 @@ pub enum Command {
         #[command(flatten)]
         daemon: DaemonArgs,
     },
+    /// Say that the maintenance that an alarm asks for was done: hours and starts are counted from now on
+    Done {
+        /// Its number
+        #[arg(value_name = "NUMBER")]
+        number: u64,
+        /// What is to be remembered of it
+        #[arg(long, value_name = "TEXT")]
+        note: Option<String>,
+        #[command(flatten)]
+        daemon: DaemonArgs,
+    },
     /// Take an alarm back from where it was put aside
     Unshelve {
         /// Its number
@@ -94,6 +105,11 @@ pub async fn run(command: Command) -> Result<(), Failure> {
             let body = json!({ "minutes": minutes, "why": why });
             let shelved = act(&mut daemon.connect().await?, number, "shelve", &body).await?;
             daemon.say(&shelved, || one(&shelved))
+        }
+        Command::Done { number, note, daemon } => {
+            let body = note.map_or(json!({}), |note| json!({ "note": note }));
+            let done = act(&mut daemon.connect().await?, number, "done", &body).await?;
+            daemon.say(&done, || one(&done))
         }
         Command::Unshelve { number, daemon } => {
             let back = act(&mut daemon.connect().await?, number, "unshelve", &json!({})).await?;

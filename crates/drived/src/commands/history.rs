@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use chrono::{DateTime, Local};
+use drived_client::{ANSWERED_WITHIN, Daemon, path_of};
 use drived_file::Config;
 use drived_history::{
     column::Point,
@@ -82,6 +83,24 @@ impl HistoryArgs {
                 Err(Failure::Input(format!("the history has nothing of a drive {drive:?}: it has {known}")))
             }
         }
+    }
+
+    /// Has a daemon that keeps it write what it has read within the last minute, by asking it for the same story; without one the file is
+    /// told as it is, and so it is where that has another drive of this name.
+    pub(crate) async fn have_written(&self, drive: &str, at: i64) -> Result<(), Failure> {
+        if self.file.is_some() {
+            return Ok(());
+        }
+        let config = Config::load(&self.config).map_err(|error| Failure::Input(error.to_string()))?;
+        let Some(socket) = config.doors.socket else { return Ok(()) };
+        let asked = async {
+            let mut daemon = Daemon::connect(socket.path.as_deref(), None).await?;
+            let path = format!("{}?at_unix_ms={at}", path_of(&["drives", drive, "why"]));
+            daemon.get(&path).await
+        };
+        // Whatever it answers, or that it does not.
+        let _ = tokio::time::timeout(ANSWERED_WITHIN, asked).await;
+        Ok(())
     }
 
     fn path(&self) -> Result<PathBuf, Failure> {

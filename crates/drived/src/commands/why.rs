@@ -28,8 +28,9 @@ pub(crate) struct Args {
     json: JsonArgs,
 }
 
-pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+pub(crate) async fn run(args: &Args) -> Result<(), Failure> {
     let at = moment_of(&args.at)?;
+    args.place.have_written(&args.name, at).await?;
     let history = args.place.open(&args.name)?;
     let told = story::tell(&history.0, &args.name, at).map_err(failed)?;
     args.json.say(|| json!(told), || tell(&told, at))

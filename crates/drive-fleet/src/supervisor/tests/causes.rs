@@ -1,6 +1,6 @@
 //! Why something happened, as its event says it, and what troubles the drive meanwhile.
 
-use drive_core::RawWord;
+use drive_core::{Lack, RawWord, Verdict};
 
 use super::*;
 use crate::ConcernKind;
@@ -76,6 +76,37 @@ fn an_output_that_is_released_at_the_drive_is_not_the_doing_of_the_policy_that_w
     rig.drive.stand();
     rig.pass(1_000 * MS);
     assert_eq!(rig.cause_of("state changed"), Some(Cause::Drive), "{:?}", rig.outputs);
+}
+
+#[test]
+fn a_motor_that_was_stopped_at_the_drive_was_not_stopped_by_the_withdrawal_behind_it() {
+    let guard = drive_core::Refusal::Overridden { by: "a guard", remedy: "close it" };
+    let lacking = |lack: Lack| move |drive: &mut Paper| drive.says = Some(Verdict::lacks(lack, guard));
+    let panel = |drive: &mut Paper| drive.status.control = Some(Control::Panel);
+    let panel_stops = |drive: &mut Paper| {
+        drive.status.control = Some(Control::Panel);
+        drive.status.state = State::Stopping;
+        drive.status.motion = drive_core::Motion::Braking;
+    };
+    let is_ours = by_policy(Policy::ReferenceTaken);
+    let cases: [(&str, &dyn Fn(&mut Paper), Option<Cause>); 4] = [
+        ("its output is cut", &lacking(Lack::Output), Some(Cause::Drive)),
+        ("the panel has it, and brings it down", &panel, Some(Cause::Drive)),
+        ("the panel has brought it down already", &panel_stops, Some(Cause::Drive)),
+        ("it turns by another reference", &lacking(Lack::Reference), is_ours),
+    ];
+    for (what, at_the_drive, cause) in cases {
+        let mut rig = Rig::ready();
+        rig.order(START);
+        rig.pass(2_000 * MS);
+        at_the_drive(&mut rig.drive);
+        rig.pass(1_000 * MS);
+        assert!(rig.drive.log.contains(&Job::Withdraw), "{what}: {:?}", rig.drive.log);
+        rig.outputs.clear();
+        rig.drive.stand();
+        rig.pass(1_000 * MS);
+        assert_eq!(rig.cause_of("state changed"), cause, "{what}: {:?}", rig.outputs);
+    }
 }
 
 #[test]

@@ -6,13 +6,19 @@ use drived_plant::plant::past::{
 };
 
 use super::{
-    super::facts::{Cause, Facts, body},
+    super::{
+        body::{Cause, body},
+        facts::Facts,
+    },
     evidence::{
         BESIDE_MS, SILENT_MS, asked_before, found_within, inputs_stayed, lost_before, nobody_asked,
         seen_beside,
     },
     silence::of_supply,
 };
+
+/// No drive is off and on again, and answers, within this time.
+const BOOT_MS: i64 = 1_500;
 
 /// What somebody or something did at the drive itself.
 pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, open: &str) -> Vec<Sentence> {
@@ -21,12 +27,39 @@ pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, op
     if matches!(&*about.what, "command_overridden" | "run_not_adopted") {
         all.extend(of_supply(facts, about));
     }
+    all.extend(of_word(facts, about));
     all.extend(seen_beside(facts, about.time_unix_ms));
     if about.what == "output_blocked" {
         all.extend(of_low_speed(facts, about));
     }
     all.push(Sentence::of(NotKnown, open));
     all
+}
+
+/// That its run command went by another word, where the drive's words leave a power cycle open: it was heard all the time.
+fn of_word(facts: &Facts, about: &RecordView) -> Option<Sentence> {
+    let at = about.time_unix_ms;
+    let is_open = about.text.contains("power cycle") && facts.is_heard(at - BOOT_MS, at);
+    is_open.then(|| {
+        let text = "no power cycle, for it was heard all the time: another word was written to it, as another master does";
+        Sentence::of(Likely, text)
+    })
+}
+
+/// What the drive showed before it came to stand, where that had been done at the drive.
+fn shown_before<'a>(facts: &'a Facts, about: &RecordView) -> Option<&'a RecordView> {
+    let at = about.time_unix_ms;
+    let own = facts.records.iter().rev().filter(|found| {
+        found.kind == "event"
+            && found.drive == about.drive
+            && found.number < about.number
+            && found.time_unix_ms >= at - BESIDE_MS
+    });
+    let mut own = own.take_while(|found| {
+        !(matches!(&*found.what, "connected" | "lost" | "tripped")
+            || found.what == "state_changed" && body(found).to.as_deref() == Some("running"))
+    });
+    own.find(|found| matches!(&*found.what, "output_blocked" | "command_overridden"))
 }
 
 /// What speaks for a time at low speed, where the drive names it among what may have stopped it: a setpoint before it, and inputs that stayed as they
@@ -89,6 +122,12 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             let (mut said, at) = (Vec::new(), about.time_unix_ms);
             let changed = body(about);
             let begins_to_run = changed.to.as_deref() == Some("running");
+            let shown = shown_before(facts, about).filter(|_| !begins_to_run);
+            if let Some(shown) = shown {
+                let text =
+                    format!("it was stopped at the drive, whose own words showed it before: {}", shown.text);
+                said.push(Sentence::of(Said, text).at(shown.time_unix_ms));
+            }
             let actions: &[&str] = match &*about.what {
                 "fault_cleared" => &["reset"],
                 _ if begins_to_run => &["start"],
@@ -114,6 +153,7 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             }
             said.extend(seen_beside(facts, at));
             let who = match &*about.what {
+                _ if shown.is_some() => "who or what did it at the drive cannot be seen from the line",
                 "fault_cleared" => {
                     "its panel, its terminals, another master or the drive itself cleared it: which of them is not known"
                 }

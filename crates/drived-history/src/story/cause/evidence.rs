@@ -5,7 +5,10 @@ use drived_plant::plant::past::{
     RecordView, SentenceView as Sentence,
 };
 
-use super::super::facts::{Facts, body, lasting};
+use super::super::{
+    body::body,
+    facts::{Facts, lasting},
+};
 
 /// What comes within this time of each other may have one cause.
 pub(super) const TOGETHER_MS: i64 = 5_000;

@@ -11,6 +11,8 @@
 //! | an input | likely | the inputs were read otherwise before and after |
 //! | the time at low speed | likely | the drive names it among others, a setpoint came before, and no input changed |
 //! | its supply | likely | it was silent, and its run command was gone when it was seen again |
+//! | its cable, and not its supply | likely | it was silent, and when it was heard again it ran on by a bus, or its watchdog had acted |
+//! | another word, and no power cycle | likely | it was heard all the time in which its run command went |
 //! | what a line's drives share | likely | they fell silent together, and nobody of them answered meanwhile |
 //! | what lines share | likely | drives of other lines fell silent with it |
 //! | one cause of several trips | likely | within two seconds, and by the same, or all by the supply |
@@ -19,6 +21,7 @@
 //!
 //! Where a row's evidence is not there, its cause is not told, or told as what is not known.
 
+mod back;
 mod drive;
 mod evidence;
 mod silence;
@@ -74,7 +77,7 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
 }
 
 /// That nothing happened, or that nobody knows.
-pub(super) fn of_nothing(facts: &Facts, at: i64) -> Vec<Sentence> {
+pub(super) fn of_nothing(facts: &Facts, at: i64, has_moved: bool) -> Vec<Sentence> {
     let mut said = match facts.gap_at(at) {
         Some((start, end)) => vec![
             Sentence::of(
@@ -85,6 +88,9 @@ pub(super) fn of_nothing(facts: &Facts, at: i64) -> Vec<Sentence> {
         ],
         None if at < facts.from || at > facts.to => {
             vec![Sentence::of(NotKnown, "the history does not reach to that moment")]
+        }
+        None if has_moved => {
+            vec![Sentence::of(Seen, "no event of it is recorded then, and its values moved").at(at)]
         }
         None => vec![Sentence::of(Seen, "nothing happened to it then that is recorded").at(at)],
     };

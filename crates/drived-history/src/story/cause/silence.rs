@@ -7,11 +7,12 @@ use drived_plant::plant::past::{
 
 use super::{
     super::facts::{Facts, begins},
+    back::{Back, Shows},
     evidence::{SILENT_MS, TOGETHER_MS, lost_before, names},
 };
 
 /// Drives that fell silent within this time of each other may have done so together: so much the polls and their repetitions lie apart.
-const SILENT_TOGETHER_MS: i64 = 3_000;
+pub(super) const SILENT_TOGETHER_MS: i64 = 3_000;
 
 /// Why a drive heard nothing for so long that its watchdog acted.
 pub(super) fn of_silence(facts: &Facts, at: i64) -> Vec<Sentence> {
@@ -65,17 +66,7 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     let mut lost = facts.elsewhere("lost", at, 2 * TOGETHER_MS);
     lost.retain(|other| (begins(other) - began).abs() <= SILENT_TOGETHER_MS);
     let answered = facts.heard_between(began, began + SILENT_TOGETHER_MS);
-    let back = facts.records.iter().filter(|found| {
-        facts.is_of_drive(found)
-            && found.number > about.number
-            && matches!(&*found.what, "command_overridden" | "run_not_adopted")
-    });
-    let is_of_this = |back: &&RecordView| {
-        facts
-            .gap_before(back.time_unix_ms)
-            .is_some_and(|(start, _)| (start - began).abs() <= SILENT_TOGETHER_MS)
-    };
-    let supply = back.filter(is_of_this).find_map(|back| of_supply(facts, back));
+    let back = Back::behind(facts, about);
     let (on_line, elsewhere): (Vec<&RecordView>, Vec<&RecordView>) =
         lost.into_iter().partition(|found| found.line == facts.line);
     if !elsewhere.is_empty() {
@@ -86,17 +77,25 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             ),
             Sentence::of(
                 Likely,
-                "what they share across the lines is the likely cause: the mains, the supply of the adapters, or this computer; which of them is not known",
+                match back.shows {
+                    Shows::Fed(_) => {
+                        "what they share across the lines is the likely cause: the supply of the adapters, or this computer; which of them is not known"
+                    }
+                    _ => {
+                        "what they share across the lines is the likely cause: the mains, the supply of the adapters, or this computer; which of them is not known"
+                    }
+                },
             ),
-        ];
+        ]
+        .into_iter()
+        .chain(back.told(facts))
+        .collect();
     }
     if let Some(why) =
         facts.missing(at - 2 * TOGETHER_MS, at + 2 * TOGETHER_MS).filter(|_| on_line.is_empty())
     {
-        return vec![Sentence::of(
-            NotKnown,
-            format!("whether others fell silent with it is not known: {why}"),
-        )];
+        let text = format!("whether others fell silent with it is not known: {why}");
+        return [Sentence::of(NotKnown, text)].into_iter().chain(back.told(facts)).collect();
     }
     match on_line.len() {
         0 => {
@@ -109,21 +108,39 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                 ),
             };
             let mut said = vec![Sentence::of(Seen, others)];
-            said.extend(supply);
-            said.push(Sentence::of(
-                NotKnown,
-                "its supply, its branch of the cable, its address or its settings: which, the line does not show",
-            ));
+            let open = match back.shows {
+                Shows::Fed(_) => Some(Sentence::of(
+                    Likely,
+                    "its own branch of the cable, or what it is plugged in by: its address and its settings are those of before, for it is heard by them again",
+                )),
+                Shows::CommandGone(_) => None,
+                Shows::Nothing => Some(Sentence::of(
+                    NotKnown,
+                    "its supply, its branch of the cable, its address or its settings: which, the line does not show",
+                )),
+            };
+            said.extend(back.told(facts));
+            said.extend(open);
             said
         }
         _ => {
             let mut said =
                 vec![Sentence::of(Seen, format!("{} of its line fell silent with it", names(&on_line)))];
-            let shared = match answered.is_empty() {
-                true => {
+            let shared = match (answered.is_empty(), &back.shows) {
+                (true, Shows::Fed(_)) => {
+                    "what they share is the likely cause: the cable or its adapter; which of them is not known"
+                }
+                (true, Shows::CommandGone(_)) => "what they share is the likely cause: their supply",
+                (true, Shows::Nothing) => {
                     "what they share is the likely cause: the cable, its adapter, or the supply of these drives; which of them is not known"
                 }
-                false => {
+                (false, Shows::Fed(_)) => {
+                    "what only they share is the likely cause, such as their part of the cable; that they fell silent together may be chance"
+                }
+                (false, Shows::CommandGone(_)) => {
+                    "what only they share is the likely cause, such as their supply; that they fell silent together may be chance"
+                }
+                (false, Shows::Nothing) => {
                     "what only they share is the likely cause, such as their supply or their part of the cable; that they fell silent together may be chance"
                 }
             };
@@ -132,7 +149,7 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                 said.push(Sentence::of(Seen, text));
             }
             said.push(Sentence::of(Likely, shared));
-            said.extend(supply);
+            said.extend(back.told(facts));
             said
         }
     }

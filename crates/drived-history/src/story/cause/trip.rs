@@ -6,7 +6,10 @@ use drived_plant::plant::past::{
 };
 
 use super::{
-    super::facts::{Facts, body, lasting},
+    super::{
+        body::body,
+        facts::{Facts, lasting},
+    },
     evidence::{
         SILENT_MS, TOGETHER_MS, asked_before, found_within, in_order, inputs_changed, lost_before, names,
     },

@@ -45,15 +45,12 @@ fn what_an_old_record_tells_as_a_policys_doing_is_believed_of_what_that_can_do()
 #[test]
 fn a_policys_doing_is_told_with_what_it_acted_upon() {
     let mut night = Written::begin("acted-upon");
-    night.event(300_000, "output_blocked", "output blocked: the STOP key of the drive", None);
+    night.event(300_000, "reference_taken", "reference taken: a limit of the drive", None);
     let text = "state changed: running to ready";
-    night.event(301_500, "state_changed", text, by_policy("output_blocked", "running", "ready"));
+    night.event(301_500, "state_changed", text, by_policy("reference_taken", "running", "ready"));
     let story = night.told(304_000);
     assert!(story.about.as_ref().unwrap().text.contains("running to ready"), "{story:?}");
-    assert!(
-        story.why(Certainty::Seen).contains("acted upon this: output blocked: the STOP key"),
-        "{story:?}"
-    );
+    assert!(story.why(Certainty::Seen).contains("acted upon this: reference taken: a limit"), "{story:?}");
 }
 
 #[test]
@@ -154,6 +151,8 @@ fn a_load_that_rose_is_told_by_the_current_where_nothing_is_recorded() {
         night.told(300_000)
     };
     let load = quiet("load", 103, 3_000);
+    assert!(load.about.as_ref().is_some_and(|about| about.text.contains("its current went")), "{load:?}");
+    assert!(!load.why(Certainty::Seen).contains("nothing happened"), "{load:?}");
     assert!(load.why(Certainty::Seen).contains("its current went from 1.2 to 10.3 A"), "{load:?}");
     assert!(load.why(Certainty::Likely).contains("the load of its motor rose"), "{load:?}");
     let slower = quiet("slower", 40, 1_000);

@@ -3,6 +3,7 @@
 
 mod causes;
 mod nights;
+mod returns;
 mod written;
 
 use std::time::Duration;
@@ -167,8 +168,13 @@ impl Written {
 
     /// It is read every second, and shows that it is ready.
     fn heard_for(&mut self, seconds: i64) {
+        self.heard_between(&[(0, seconds)]);
+    }
+
+    /// Likewise from each of these seconds to the other.
+    fn heard_between(&mut self, spans: &[(i64, i64)]) {
         let mut tracker = Tracker::default();
-        for at in (0..seconds).map(|second| second * 1_000) {
+        for at in spans.iter().flat_map(|(from, to)| *from..*to).map(|second| second * 1_000) {
             let Some(seen) = tracker.see(at, 3_000, &[(Quantity::STATE, 2)]) else { continue };
             let shown = vec![Shown { drive: "pump 1".into(), set: Set::Status, seen }];
             self.archive.take(Batch { shown, ..Batch::default() }, on_wall(at));

@@ -95,6 +95,7 @@ const TABLE = {
   alarm_line_finding: ['the line is not as it should be', 'la ligne n’est pas comme elle devrait être'],
   alarm_audit_log: ['the audit log cannot be written, only stops are carried out', 'le journal d’audit ne peut être écrit, seuls les arrêts sont exécutés'],
   alarm_history: ['the history cannot be written, what happens now is not known later', 'l’historique ne peut être écrit, ce qui se passe maintenant ne sera pas connu plus tard'],
+  alarm_maintenance: ['maintenance is due', 'un entretien est à faire'],
   alarm_reload: ['the configuration does not hold as it was read again', 'la configuration relue ne tient pas'],
   alarm_of_line: ['line {line}', 'ligne {line}'],
   alarm_of_program: ['the program', 'le programme'],

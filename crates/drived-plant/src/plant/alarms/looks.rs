@@ -36,6 +36,11 @@ impl Inner {
         self.tell_alarms(&alarms, &changes);
     }
 
+    /// Looks at what is to be seen to of a drive.
+    pub(in crate::plant) fn look_for_maintenance(&self, line: &str, drive: &str, due: &[(String, String)]) {
+        self.look_for(&[Look::at_maintenance(line, drive, due)], now());
+    }
+
     /// Looks at the lines and at the program, and who is not there any more.
     pub(in crate::plant) fn look_for_alarms(&self) {
         if *self.alarms.is_closed.borrow() {

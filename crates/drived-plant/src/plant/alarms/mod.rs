@@ -59,6 +59,8 @@ pub enum AlarmAct {
     Shelve { time: Duration, why: String },
     /// It is put aside no more.
     Unshelve,
+    /// What an alarm of maintenance asks for was done: from now on it is counted anew.
+    Done { note: Option<String> },
 }
 
 /// Why nothing is done with an alarm.
@@ -70,6 +72,10 @@ pub enum AlarmRejected {
     OutOfScope { caller: String, of: String },
     #[error("it has come again since it was seen")]
     CameAgain,
+    #[error("only maintenance is done, and this is none")]
+    NoMaintenance,
+    #[error("no history is kept by this program, in which it would be kept")]
+    NotKept,
     #[error(transparent)]
     Refused(#[from] AlarmRefused),
 }
@@ -82,7 +88,8 @@ impl AlarmRejected {
             Self::CameAgain => "came_again",
             Self::Refused(AlarmRefused::NoSuchAlarm(_)) => "not_found",
             Self::Refused(AlarmRefused::OfMotion) => "of_motion",
-            Self::Refused(_) => "malformed",
+            Self::NotKept => "not_kept",
+            Self::NoMaintenance | Self::Refused(_) => "malformed",
         }
     }
 }
@@ -142,10 +149,29 @@ impl Plant {
             }
             AlarmAct::Shelve { time, why } => alarms.shelve(id, &caller.name, why, *time, now)?,
             AlarmAct::Unshelve => alarms.unshelve(id)?,
+            AlarmAct::Done { note } => {
+                let (Some(drive), Some(part)) = (&alarm.drive, &alarm.mark) else {
+                    return Err(AlarmRejected::NoMaintenance);
+                };
+                if alarm.kind != AlarmKind::Maintenance {
+                    return Err(AlarmRejected::NoMaintenance);
+                }
+                let past = self.past().ok_or(AlarmRejected::NotKept)?;
+                let done = (drive.clone(), part.clone());
+                let changes = alarms.acknowledge(id, &caller.name, note.as_deref(), now)?;
+                past.maintained(&done.0, &done.1, &caller.name, note.as_deref());
+                changes
+            }
         };
         self.0.tell_alarms(&alarms, &changes);
         let after = changes.last().map(|change| AlarmView::of(&change.alarm, &alarms));
         Ok(after.unwrap_or(before))
+    }
+
+    /// What is to be seen to of a drive after so many hours or starts, as whoever counts them says: what is due, each by its name and with why.
+    /// What is not among it is due no more.
+    pub fn tell_maintenance(&self, line: &str, drive: &str, due: &[(String, String)]) {
+        self.0.look_for_maintenance(line, drive, due);
     }
 
     /// A drive is called otherwise.

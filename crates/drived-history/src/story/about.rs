@@ -1,0 +1,162 @@
+//! What somebody means who asks for a moment, and what is told beside it.
+
+use drived_plant::plant::past::{Certainty, RecordView, SentenceView as Sentence};
+
+use super::{
+    body::{Cause, body},
+    facts::{Facts, begins, lasting},
+};
+
+/// A moment that is a whole minute means that minute.
+const MINUTE_MS: i64 = 60_000;
+/// So long after it happened a drive shows something at the latest, as a rule; the clock of whoever asks is not this one.
+const SHOWN_MS: i64 = 3_000;
+const CLOCK_MS: i64 = 1_000;
+/// What is farther away than this is not what is asked for.
+const FAR_MS: i64 = 10_000;
+/// What is heavier than what is asked for is told beside it within this time.
+const BESIDE_MS: i64 = 300_000;
+/// What a story is about, the weightiest first. `run`: a motor began or ceased to run.
+const WEIGHT: [&str; 24] = [
+    "tripped",
+    "stop_unconfirmed",
+    "other_family",
+    "identity_changed",
+    "run_command_stands",
+    "output_blocked",
+    "reference_taken",
+    "command_overridden",
+    "run_not_adopted",
+    "control_taken",
+    "watchdog_not_in_force",
+    "lost",
+    "fault_cleared",
+    "run",
+    "output_departed",
+    "limit",
+    "stop",
+    "start",
+    "reset",
+    "release",
+    "setpoint",
+    "state_changed",
+    "warning",
+    "control_returned",
+];
+/// What is heavier than anything that a person does.
+const HEAVY: usize = 12;
+
+/// What is asked for: a moment, or the minute that begins with it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Asked {
+    from: i64,
+    to: i64,
+}
+
+impl Asked {
+    pub(super) const fn of(at: i64) -> Self {
+        let lasts = if at.rem_euclid(MINUTE_MS) == 0 { MINUTE_MS - 1 } else { 0 };
+        Self { from: at, to: at + lasts }
+    }
+
+    /// How far away something is.
+    fn distance(self, at: i64) -> i64 {
+        (self.from - at).max(at - self.to).max(0)
+    }
+
+    /// Whether it is what was meant, as exactly as a clock is read and a drive is polled.
+    fn is_met_by(self, at: i64) -> bool {
+        (self.from - CLOCK_MS..=self.to + SHOWN_MS).contains(&at)
+    }
+}
+
+/// How much something weighs; `None`: no story is about it.
+fn weight(found: &RecordView) -> Option<usize> {
+    let of = |what: &str| WEIGHT.iter().position(|one| *one == what);
+    let is_run = || {
+        let body = body(found);
+        let runs = |state: Option<&str>| state == Some("running");
+        let begins = !runs(body.from.as_deref()) && runs(body.to.as_deref());
+        let ends = runs(body.from.as_deref()) && !runs(body.to.as_deref());
+        // A start that was asked for is told as that.
+        ends || begins && !matches!(body.cause, Some(Cause::Command { .. }))
+    };
+    match &*found.what {
+        "state_changed" if is_run() => of("run"),
+        what => of(what),
+    }
+}
+
+/// What there is of the drive that a story can be about, with its weight and its beginning.
+fn told_of(facts: &Facts) -> impl Iterator<Item = (usize, i64, &RecordView)> {
+    let is_one =
+        |found: &&RecordView| matches!(&*found.kind, "event" | "command") && facts.is_of_drive(found);
+    facts.records.iter().filter(is_one).filter_map(|found| Some((weight(found)?, begins(found), found)))
+}
+
+/// What somebody means who asks for this moment: the weightiest of what was then; else what is nearest, within seconds; else what was found
+/// when the drive was seen again, where nobody saw it then. `None`: nothing happened.
+pub(super) fn about(facts: &Facts, asked: Asked) -> Option<&RecordView> {
+    let then = told_of(facts)
+        .filter(|(_, begins, _)| asked.is_met_by(*begins))
+        .min_by_key(|(weight, begins, found)| (*weight, asked.distance(*begins), found.number));
+    let near = || {
+        told_of(facts)
+            .filter(|(_, begins, _)| asked.distance(*begins) <= SHOWN_MS)
+            .min_by_key(|(weight, begins, found)| (asked.distance(*begins), *weight, found.number))
+    };
+    let unseen = || {
+        let (start, end) = facts.gap_at(asked.from)?;
+        told_of(facts)
+            .filter(|(weight, begins, found)| {
+                *weight <= HEAVY + 1
+                    && (*begins >= asked.from || found.what == "lost")
+                    && (start - CLOCK_MS..=end + SHOWN_MS).contains(begins)
+            })
+            .min_by_key(|(weight, _, found)| (*weight, found.number))
+    };
+    let soon = || {
+        told_of(facts)
+            .filter(|(weight, begins, _)| {
+                *weight <= HEAVY + 1 && (asked.from..=asked.to + FAR_MS).contains(begins)
+            })
+            .min_by_key(|(weight, begins, found)| (asked.distance(*begins), *weight, found.number))
+    };
+    then.or_else(near).or_else(unseen).or_else(soon).map(|(_, _, found)| found)
+}
+
+/// What is heavier than what is asked for, before and after it: and not as its cause. Where nothing happened, what
+/// was next.
+pub(super) fn beside(
+    facts: &Facts,
+    about: Option<&RecordView>,
+    moment: i64,
+    told: &[Sentence],
+) -> Vec<Sentence> {
+    let known = about.and_then(weight);
+    let is_told = |weight: usize, begins: i64| match known {
+        Some(known) => weight < known.min(HEAVY) && (begins - moment).abs() <= BESIDE_MS,
+        None => true,
+    };
+    let number = about.map_or(0, |about| about.number);
+    let others = || {
+        told_of(facts).filter(|(weight, begins, found)| {
+            found.number != number
+                && found.time_unix_ms != moment
+                && is_told(*weight, *begins)
+                && !told.iter().any(|one| one.time_unix_ms == Some(found.time_unix_ms))
+        })
+    };
+    let before = others().filter(|(_, begins, _)| *begins < moment).max_by_key(|(_, begins, _)| *begins);
+    let after = others().filter(|(_, begins, _)| *begins >= moment).min_by_key(|(_, begins, _)| *begins);
+    let word = if about.is_some() { "" } else { "next " };
+    let told = [(before, "before"), (after, "after")];
+    told.into_iter()
+        .filter_map(|(found, side)| {
+            let (_, begins, found) = found?;
+            let away = lasting((begins - moment).abs());
+            let text = format!("{word}{side} it, {away} away: {}", facts.in_words(found));
+            Some(Sentence::of(Certainty::Seen, text).at(found.time_unix_ms))
+        })
+        .collect()
+}

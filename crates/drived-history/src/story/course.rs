@@ -1,0 +1,167 @@
+//! What happened around a moment, in its order, and what of it nobody knows.
+
+use drived_plant::plant::past::{Certainty, RecordView, SentenceView as Sentence};
+use rusqlite::Connection;
+
+use super::{
+    body::{Cause, body},
+    facts::{Facts, lasting},
+};
+use crate::{read::parameters, store::StoreError};
+
+/// From so long before the event,
+pub(super) const BEFORE_MS: i64 = 120_000;
+/// to so long after it is told what happened.
+pub(super) const AFTER_MS: i64 = 300_000;
+/// So many sentences at the most.
+const COURSE: usize = 60;
+
+/// What happened around a moment, in the daemon's order.
+pub(super) fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
+    let is_told = |found: &&RecordView| {
+        let is_near = (moment - BEFORE_MS..=moment + AFTER_MS).contains(&found.time_unix_ms);
+        let of_line = found.line.is_some() && found.line == facts.line;
+        let weighs =
+            matches!(&*found.what, "tripped" | "lost" | "connected" | "line_finding" | "stop_unconfirmed");
+        let is_meant = match &*found.kind {
+            "event" => facts.is_of_drive(found) || of_line && weighs,
+            "command" => facts.is_of_drive(found),
+            // What an alarm is of stands beside it as an event, but for those of a line.
+            "alarm" => {
+                of_line
+                    && found.drive.is_none()
+                    && matches!(&*found.what, "unacknowledged" | "returned" | "over")
+            }
+            _ => true,
+        };
+        is_near && is_meant
+    };
+    let told: Vec<&RecordView> = facts.records.iter().filter(is_told).collect();
+    // What several events show that came with one status is told with the first of them.
+    let with_words = |place: usize, found: &RecordView| {
+        let is_same =
+            |before: &&&RecordView| before.time_unix_ms == found.time_unix_ms && before.drive == found.drive;
+        facts.is_of_drive(found) && !told[..place].iter().rev().take(3).any(|before| is_same(&before))
+    };
+    let first = told.iter().take(COURSE).enumerate();
+    let mut course: Vec<Sentence> =
+        first.map(|(place, found)| sentence(facts, found, with_words(place, found))).collect();
+    if told.len() > COURSE {
+        let text = format!("{} more records follow: drived history tells them all", told.len() - COURSE);
+        course.push(Sentence::of(Certainty::Seen, text));
+    }
+    course
+}
+
+/// Settings of the drive that were read or written here between two moments as another value than before.
+pub(super) fn settings(
+    connection: &Connection,
+    drive: &str,
+    from: i64,
+    to: i64,
+) -> Result<Vec<Sentence>, StoreError> {
+    let settings = parameters(connection, drive)?;
+    let mut said = Vec::new();
+    for (place, setting) in settings.iter().enumerate() {
+        let at = setting.first_unix_ms;
+        if !(from..=to).contains(&at) {
+            continue;
+        }
+        let before = place.checked_sub(1).map(|before| &settings[before]);
+        let was = match before.filter(|before| before.address == setting.address) {
+            Some(before) => format!("it was {}", before.text),
+            None => "what it was before is not recorded".to_owned(),
+        };
+        let text =
+            format!("its setting {} was read, or written, as {}; {was}", setting.mnemonic, setting.text);
+        said.push(Sentence::of(Certainty::Seen, text).at(at));
+    }
+    Ok(said)
+}
+
+/// What happened, with what else was.
+pub(super) fn with_settings(mut course: Vec<Sentence>, settings: Vec<Sentence>) -> Vec<Sentence> {
+    for setting in settings {
+        let later = |one: &Sentence| one.time_unix_ms > setting.time_unix_ms;
+        let place = course.iter().position(later).unwrap_or(course.len());
+        course.insert(place, setting);
+    }
+    course
+}
+
+fn sentence(facts: &Facts, found: &RecordView, with_words: bool) -> Sentence {
+    let who = match (&found.drive, &found.line) {
+        (Some(drive), _) if *drive == facts.drive => String::new(),
+        (Some(drive), _) => format!("{drive}: "),
+        (None, Some(line)) => format!("line {line}: "),
+        (None, None) => String::new(),
+    };
+    let body = body(found);
+    let by = match facts.cause_of(found) {
+        Some(Cause::Command { commander, door }) => {
+            let door = door.as_ref().map(|door| format!(" through {door}")).unwrap_or_default();
+            format!(" (by {commander}{door})")
+        }
+        Some(Cause::Policy { policy }) => {
+            format!(" (by this program's policy: {})", policy.replace('_', " "))
+        }
+        _ => String::new(),
+    };
+    let words: Vec<String> = body
+        .words
+        .iter()
+        .filter(|_| with_words)
+        .map(|word| match word.before {
+            Some(before) => format!("{} {before:04X}h to {:04X}h", word.code, word.value),
+            None => format!("{} {:04X}h", word.code, word.value),
+        })
+        .collect();
+    let words = if words.is_empty() { String::new() } else { format!(" [{}]", words.join(", ")) };
+    let asked = if found.kind == "command" { "asked: " } else { "" };
+    let text = match found.text.strip_prefix("returned: ") {
+        Some(alarm) if found.kind == "alarm" => format!("over: {alarm}"),
+        _ => found.text.clone(),
+    };
+    Sentence::of(Certainty::Seen, format!("{who}{asked}{text}{by}{words}")).at(found.time_unix_ms)
+}
+
+/// What nobody can tell by what is kept.
+pub(super) fn not_known(facts: &Facts, moment: i64, is_about: bool) -> Vec<Sentence> {
+    let mut said = Vec::new();
+    let is_near = |time: i64| (moment - BEFORE_MS..=moment + AFTER_MS).contains(&time);
+    for found in facts.records.iter().filter(|found| found.kind == "history") {
+        if found.what == "began_after_kill"
+            && let Some(last) = body(found).last_known_unix_ms
+        {
+            let text = "this is the last that was kept before this program was killed: when that was is not known, and of what it read and did until then up to a minute may be missing here; then it did not run until it began again";
+            said.push(Sentence::of(Certainty::NotKnown, text).at(last));
+        }
+        if found.what == "hole" {
+            said.push(Sentence::of(Certainty::NotKnown, found.text.clone()).at(found.time_unix_ms));
+        }
+    }
+    for (start, end) in &facts.gaps {
+        if is_near(*start) || is_near(*end) || (*start..=*end).contains(&moment) {
+            let text =
+                format!("for {} from then on no value of {} is known", lasting(end - start), facts.drive);
+            said.push(Sentence::of(Certainty::NotKnown, text).at(*start));
+        }
+    }
+    if facts.is_cut {
+        let text = "so much happened in the plant that the later part of it was not looked at";
+        said.push(Sentence::of(Certainty::NotKnown, text));
+    }
+    let share = facts.known * 100.0;
+    let around = lasting(facts.to - facts.from);
+    let text = match is_about {
+        true => format!("{share:.0} % of the {around} around it are known"),
+        false => format!("nothing is recorded of it then; {share:.0} % of the {around} around are known"),
+    };
+    let certainty = if is_about || share >= 99.0 { Certainty::Seen } else { Certainty::NotKnown };
+    said.push(Sentence::of(certainty, text));
+    if is_about {
+        let text = "a drive is looked at from poll to poll: what lies closer together than that may have been the other way round";
+        said.push(Sentence::of(Certainty::NotKnown, text));
+    }
+    said
+}

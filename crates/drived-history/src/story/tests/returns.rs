@@ -1,0 +1,153 @@
+//! What a drive shows that is heard again, and what is read of a drive where its values are not kept yet: on histories that are written by hand.
+
+use serde_json::{Value, json};
+
+use super::{Certainty, Says as _, Story, Written, fault};
+use crate::record::Kind;
+
+const LOST: &str = "lost for 1.9 s: slave 1, reading register 3201 (0C81h): the slave is off-line";
+
+fn lost() -> Option<Value> {
+    Some(json!({ "silent_for_ms": 1_900 }))
+}
+
+/// What the API tells of a drive that is heard.
+fn heard(state: &str, control: &str) -> Option<Value> {
+    Some(json!({ "status": { "state": state, "control": control } }))
+}
+
+/// A drive that runs falls silent, its neighbour too if that is said, and is heard again at 306 s with what follows.
+fn silence(name: &str, is_neighbour_lost: bool, back: impl FnOnce(&mut Written)) -> Story {
+    let mut night = Written::begin(name);
+    night.heard_between(&[(0, 298), (306, 400)]);
+    night.event(300_000, "lost", LOST, lost());
+    if is_neighbour_lost {
+        night.kept(Kind::Event, Some("pump 2"), 300_100, "lost", LOST, lost());
+    }
+    back(&mut night);
+    night.told(299_000)
+}
+
+fn runs_on(night: &mut Written) {
+    night.event(306_000, "connected", "connected: running, forward, 30.00 Hz", heard("running", "bus"));
+}
+
+fn by_watchdog(night: &mut Written) {
+    night.event(306_000, "connected", "connected: fault, forward, 0.00 Hz", heard("fault", "bus"));
+    let found = |by| fault(by, true).map(|body| serde_json::from_str(&body).unwrap());
+    night.event(306_000, "tripped", "tripped, found so", found(false));
+    let text =
+        "trip explained, found so by its communication watchdog: 5 SLF: Modbus communication interruption";
+    night.event(306_700, "trip_explained", text, found(true));
+}
+
+fn command_gone(night: &mut Written) {
+    night.event(306_000, "connected", "connected: ready, forward, 0.00 Hz", heard("ready", "bus"));
+    let text = "command overridden: another word, or a power cycle, that took the place of the run command";
+    night.event(306_000, "command_overridden", text, None);
+}
+
+#[test]
+fn a_drive_that_ran_on_or_whose_watchdog_acted_was_fed_while_it_was_silent() {
+    let backs: [(&str, fn(&mut Written)); 2] = [("on", runs_on), ("watchdog", by_watchdog)];
+    for (name, back) in backs {
+        let story = silence(&format!("fed-{name}"), false, back);
+        let likely = story.why(Certainty::Likely);
+        assert!(likely.contains("its own branch of the cable") && likely.contains("not away"), "{story:?}");
+        assert!(!story.why(Certainty::NotKnown).contains("its supply"), "{story:?}");
+        assert!(
+            story.why(Certainty::Seen).contains("heard again 7.9 s after it was heard last"),
+            "{story:?}"
+        );
+
+        let story = silence(&format!("fed-line-{name}"), true, back);
+        let likely = story.why(Certainty::Likely);
+        assert!(likely.contains("the cable or its adapter; which"), "{story:?}");
+        assert!(!likely.contains("or the supply of these drives"), "{story:?}");
+    }
+}
+
+#[test]
+fn a_supply_that_is_likely_is_not_told_as_not_known_with_the_next_line() {
+    for is_line in [false, true] {
+        let story = silence(&format!("supply-alone-{is_line}"), is_line, command_gone);
+        let (likely, open) = (story.why(Certainty::Likely), story.why(Certainty::NotKnown));
+        assert!(likely.contains("its supply was away"), "{story:?}");
+        assert!(!open.contains("which, the line does not show"), "{story:?}");
+        assert!(!likely.contains("cable"), "{story:?}");
+    }
+}
+
+#[test]
+fn a_drive_that_stood_or_may_start_by_itself_or_was_not_heard_again_says_nothing_of_its_supply() {
+    let backs: [(&str, fn(&mut Written)); 4] = [
+        ("stood", |night| {
+            night.event(306_000, "connected", "connected: ready", heard("ready", "bus"));
+        }),
+        ("terminals", |night| {
+            night.event(306_000, "connected", "connected: running", heard("running", "terminals"));
+        }),
+        ("began to run", |night| {
+            night.event(306_000, "connected", "connected: running", heard("running", "bus"));
+            let body = json!({ "from": "ready", "to": "running", "cause": { "by": "found" } });
+            night.event(306_000, "state_changed", "state changed: ready to running", Some(body));
+        }),
+        ("never", |_| {}),
+    ];
+    for (name, back) in backs {
+        let story = silence(&format!("open-{name}"), false, back);
+        assert_eq!(story.why(Certainty::Likely), "", "{name}: {story:?}");
+        assert!(story.why(Certainty::NotKnown).contains("its supply, its branch of the cable"), "{story:?}");
+        let is_told = story.why(Certainty::Seen).contains("heard again");
+        assert_eq!(is_told, name != "never", "{story:?}");
+    }
+}
+
+#[test]
+fn what_a_drive_showed_before_a_kill_is_known_though_its_values_were_lost() {
+    let mut night = Written::begin("kill-known");
+    let body = json!({ "from": "ready", "to": "running", "cause": { "by": "command", "commander": "anna" } });
+    night.event(203_000, "state_changed", "state changed: ready to running", Some(body));
+    night.killed_until(217_000);
+    night.event(217_300, "connected", "connected: fault", heard("fault", "bus"));
+    let found = fault(false, true).map(|body| serde_json::from_str(&body).unwrap());
+    night.event(217_300, "tripped", "tripped, found so: 9 OCF: overcurrent", found);
+    let story = night.told(217_000);
+    let open = story.why(Certainty::NotKnown);
+    assert!(open.contains("within the 14.3 s from this moment on"), "{story:?}");
+    let began = story.why.iter().find(|one| one.text.contains("within the")).unwrap();
+    assert_eq!(began.time_unix_ms, Some(super::NIGHT_MS + 203_000), "{story:?}");
+}
+
+#[test]
+fn a_motor_that_stands_behind_a_stop_at_the_drive_is_told_by_that_stop() {
+    let text = "output blocked: the STOP key of the drive decides instead";
+    for cause in [json!({ "by": "drive" }), json!({ "by": "policy", "policy": "output_blocked" })] {
+        let mut night = Written::begin("stop-key");
+        night.event(300_000, "output_blocked", text, None);
+        let by_policy = json!({ "cause": { "by": "policy", "policy": "output_blocked" } });
+        night.event(300_400, "command", "command: withdrawal of the run command", Some(by_policy));
+        let body = json!({ "from": "running", "to": "ready", "cause": cause });
+        night.event(300_400, "state_changed", "state changed: running to ready", Some(body));
+        let story = night.told(303_000);
+        assert!(story.about.as_ref().unwrap().text.contains("running to ready"), "{story:?}");
+        let told = format!("{}\n{}", story.why(Certainty::Seen), story.course());
+        assert!(!told.contains("by its policy") && !told.contains("ready (by this program"), "{story:?}");
+        assert!(story.why(Certainty::Said).contains("stopped at the drive"), "{story:?}");
+        assert!(story.why(Certainty::Said).contains("the STOP key"), "{story:?}");
+    }
+}
+
+#[test]
+fn a_word_that_went_while_the_drive_was_heard_went_by_no_power_cycle() {
+    for is_heard in [true, false] {
+        let mut night = Written::begin(&format!("word-{is_heard}"));
+        let spans: &[(i64, i64)] = if is_heard { &[(0, 400)] } else { &[(0, 290), (300, 400)] };
+        night.heard_between(spans);
+        let text =
+            "command overridden: another word, or a power cycle, that took the place of the run command";
+        night.event(300_000, "command_overridden", text, None);
+        let story = night.told(300_000);
+        assert_eq!(story.why(Certainty::Likely).contains("no power cycle"), is_heard, "{story:?}");
+    }
+}
