@@ -5,6 +5,7 @@
 
 mod bundle;
 mod files;
+pub mod french;
 #[cfg(test)]
 mod tests;
 

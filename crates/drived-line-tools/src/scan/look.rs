@@ -30,6 +30,15 @@ const TELL_TALE: u32 = 2;
 /// How many exchanges the line keeps: those of one status.
 const KEPT: usize = 8;
 
+/// An address of a line.
+#[derive(Clone, Copy)]
+pub(super) struct At<'a> {
+    pub line: &'a Line,
+    pub slave: SlaveAddress,
+    /// Another master was heard there: what answers him is no second slave.
+    pub is_shared: bool,
+}
+
 /// Whether an address answers at all.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Heard {
@@ -41,7 +50,8 @@ pub(super) enum Heard {
 
 /// Asks an address for one register, and listens on for a second answer where one has come: again and again while anything is
 /// odd, until the line has found what, or there was one answer and nothing else.
-pub(super) async fn ask(line: &Line, slave: SlaveAddress, wait: Duration) -> Result<Heard, Failure> {
+pub(super) async fn ask(at: At<'_>, wait: Duration) -> Result<Heard, Failure> {
+    let At { line, slave, .. } = at;
     line.keep_exchanges(KEPT);
     let mut drive = open(line, Family::ATV312, slave);
     let (mut damaged, mut is_there) = (None, false);
@@ -68,7 +78,7 @@ pub(super) async fn ask(line: &Line, slave: SlaveAddress, wait: Duration) -> Res
         }
         let is_odd =
             |fact: &Fact| fact.at >= began && fact.slave == Some(slave.number()) && is_odd(fact.what);
-        if damaged.is_none() && !line.evidence().iter().any(is_odd) || found(line, slave).is_some() {
+        if damaged.is_none() && !line.evidence().iter().any(is_odd) || found(at).is_some() {
             break;
         }
     }
@@ -81,10 +91,11 @@ const fn is_odd(what: What) -> bool {
 }
 
 /// What the line has found wrong with this slave by its evidence, as `doctor` and `run` would.
-pub(super) fn found(line: &Line, slave: SlaveAddress) -> Option<Finding> {
+pub(super) fn found(At { line, slave, is_shared }: At<'_>) -> Option<Finding> {
     let is_it = |finding: &Finding| {
         finding.slave == Some(slave.number())
             && !matches!(finding.defect, Defect::RefusesAll(_) | Defect::FellSilent(_))
+            && !(is_shared && finding.is_of_two())
     };
     line.findings().into_iter().find(is_it)
 }
@@ -109,10 +120,11 @@ impl<T> From<Asked<T>> for Looks<T> {
 }
 
 /// Whether a slave can be read as a drive of a family.
-pub(super) async fn status(line: &Line, family: Family, slave: SlaveAddress) -> Looks<()> {
+pub(super) async fn status(at: At<'_>, family: Family) -> Looks<()> {
+    let At { line, slave, .. } = at;
     let mut drive = family.open(line.slave(slave.number()).until_refused(TELL_TALE), slave);
     own_line::wait_at_most(&mut *drive);
-    match often(line, slave, async || drive.status().await).await {
+    match often(at, async || drive.status().await).await {
         // What it does not have is not in its status: a drive without a status word is none of the family.
         Asked::Told(status) if !status.is_explained() => Looks::Unlike,
         Asked::Told(_) => Looks::Like(()),
@@ -134,13 +146,9 @@ pub(super) fn longest_read(line: &Line, slave: SlaveAddress) -> u16 {
 }
 
 /// What a drive of a family says it is, and how its watchdog is set, where it tells.
-pub(super) async fn identity(
-    line: &Line,
-    family: Family,
-    slave: SlaveAddress,
-) -> Looks<(Likeness, Option<Watchdog>)> {
-    let mut drive = open(line, family, slave);
-    let identity = match often(line, slave, async || drive.identify().await).await {
+pub(super) async fn identity(at: At<'_>, family: Family) -> Looks<(Likeness, Option<Watchdog>)> {
+    let mut drive = open(at.line, family, at.slave);
+    let identity = match often(at, async || drive.identify().await).await {
         Asked::Told(identity) => Some(identity),
         Asked::Refused => None,
         Asked::Damaged => return Looks::Damaged,
@@ -166,9 +174,9 @@ async fn watchdog(drive: &mut dyn Drive) -> Option<Watchdog> {
 }
 
 /// Reads what two drives alike differ in, if in anything: voltages, temperatures, hours.
-pub(super) async fn measurements(line: &Line, family: Family, slave: SlaveAddress) -> Looks<()> {
-    let mut drive = open(line, family, slave);
-    often(line, slave, async || drive.measurements().await.map(drop)).await.into()
+pub(super) async fn measurements(at: At<'_>, family: Family) -> Looks<()> {
+    let mut drive = open(at.line, family, at.slave);
+    often(at, async || drive.measurements().await.map(drop)).await.into()
 }
 
 fn likeness(family: Family, identity: Option<Identity>) -> Likeness {
@@ -197,11 +205,8 @@ enum Asked<T> {
 
 /// Asks until an answer is intact or refuses, but not for ever. Something short is asked in between: what is damaged every time
 /// while that never is tells more.
-async fn often<T>(
-    line: &Line,
-    slave: SlaveAddress,
-    mut ask: impl AsyncFnMut() -> Result<T, Error>,
-) -> Asked<T> {
+async fn often<T>(at: At<'_>, mut ask: impl AsyncFnMut() -> Result<T, Error>) -> Asked<T> {
+    let At { line, slave, .. } = at;
     for _ in 0..ASKED {
         let before = unasked(line);
         let error = match ask().await {
@@ -211,7 +216,7 @@ async fn often<T>(
         if !is_damaged(&error, unasked(line) > before) {
             return Asked::Refused;
         }
-        if found(line, slave).is_some() {
+        if found(at).is_some() {
             break;
         }
         let _ = open(line, Family::ATV312, slave).keep_alive().await;

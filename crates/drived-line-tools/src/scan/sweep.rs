@@ -166,14 +166,14 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
     async fn ask(&mut self, step: Step) -> Result<Option<Find>, Failure> {
         let line = self.fed_line(step).await?;
         let before = look::unasked(&line);
-        let heard = look::ask(&line, step.slave, self.wait).await?;
+        let heard = look::ask(self.look_at(&line, step), self.wait).await?;
         let silent = std::mem::replace(&mut self.silent, Some(step).filter(|_| heard == Heard::Nothing));
         let silent = silent.filter(|silent| silent.trial == step.trial);
         self.note_disturbing(silent, &line, before);
         let (answer, interval) = match heard {
             Heard::Nothing => return Ok(None),
             Heard::Damaged(why) => self.judged(step, Vec::new(), Some(why)).await?,
-            Heard::Somebody if self.found(&line, step).is_some() => {
+            Heard::Somebody if look::found(self.look_at(&line, step)).is_some() => {
                 self.judged(step, Vec::new(), None).await?
             }
             Heard::Somebody => self.recognise(step).await?,
@@ -209,14 +209,14 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
                 break;
             }
             let line = self.line_fed_for(step, LOOK).await?;
-            if self.found(&line, step).is_some_and(|finding| finding.is_of_two()) {
+            if look::found(self.look_at(&line, step)).is_some_and(|finding| finding.is_of_two()) {
                 break;
             }
             let config = line.config();
             if line_spec::check(&config, &[DriveName { family, slave: step.slave }]).is_err() {
                 continue;
             }
-            let looks = look::status(&line, family, step.slave).await;
+            let looks = look::status(self.look_at(&line, step), family).await;
             longest = longest.max(look::longest_read(&line, step.slave));
             match looks {
                 Looks::Like(()) => {}
@@ -227,7 +227,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
                 }
             }
             let line = self.line_fed_for(step, LOOK).await?;
-            match look::identity(&line, family, step.slave).await {
+            match look::identity(self.look_at(&line, step), family).await {
                 Looks::Like((likeness, watchdog)) => {
                     intervals.push((family, interval(family, config.protocol.is_ascii(), watchdog)));
                     alike.push(likeness);
@@ -236,7 +236,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
                 Looks::Damaged => is_damaged = true,
             }
             let line = self.line_fed_for(step, LOOK).await?;
-            is_damaged |= look::measurements(&line, family, step.slave).await == Looks::Damaged;
+            is_damaged |= look::measurements(self.look_at(&line, step), family).await == Looks::Damaged;
         }
         let named = alike.iter().any(|likeness| likeness.certain);
         alike.retain(|likeness| match named {
@@ -245,6 +245,9 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
         });
         intervals.retain(|(family, _)| alike.iter().any(|likeness| likeness.family == *family));
         let interval = intervals.into_iter().filter_map(|(_, interval)| interval).min();
+        // Another master damages some answers, and behind one a refusal is not believed at once: a look as one more family may come
+        // to nothing by that. It takes nothing from what was read whole.
+        let is_damaged = is_damaged && (!self.is_shared || alike.is_empty());
         let damaged = is_damaged.then(|| "again and again its answers are damaged".to_owned());
         let (answer, unknown) = self.judged(step, alike, damaged).await?;
         Ok((answer, interval.or(unknown)))
@@ -259,7 +262,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
     ) -> Result<(Answer, Option<Duration>), Failure> {
         let line = self.line(step.trial).await?;
         let often = Some(Duration::from_secs(1));
-        Ok(match (self.found(&line, step), damaged) {
+        Ok(match (look::found(self.look_at(&line, step)), damaged) {
             (Some(finding), _) if finding.is_of_two() => (Answer::Two { alike, finding }, often),
             (Some(finding), Some(_)) => (Answer::Damaged(finding.to_string()), None),
             (None, Some(why)) => (Answer::Damaged(why), None),
@@ -270,9 +273,9 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
         })
     }
 
-    /// What the line has found wrong at this address. Where another master was heard the answers to him are no second ones.
-    fn found(&self, line: &Line, step: Step) -> Option<Finding> {
-        look::found(line, step.slave).filter(|finding| !(self.is_shared && finding.is_of_two()))
+    /// The address of a step, on the line at its settings.
+    const fn look_at<'line>(&self, line: &'line Line, step: Step) -> look::At<'line> {
+        look::At { line, slave: step.slave, is_shared: self.is_shared }
     }
 
     /// The line at a step's settings, after those were fed who could not wait.

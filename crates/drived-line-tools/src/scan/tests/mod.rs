@@ -47,7 +47,10 @@ async fn scanned(simulated: &SimLine, plan: &Plan) -> Vec<Find> {
 }
 
 async fn scanned_over(open: impl AsyncFn(LineConfig) -> Result<Line, Failure>, plan: &Plan) -> Vec<Find> {
-    let mut sweep = Sweep::new(plan, LineConfig::stream(SerialSettings::MODBUS_DEFAULT), WAIT, open);
+    found_by(&mut Sweep::new(plan, LineConfig::stream(SerialSettings::MODBUS_DEFAULT), WAIT, open)).await
+}
+
+async fn found_by(sweep: &mut Sweep<'_, impl AsyncFn(LineConfig) -> Result<Line, Failure>>) -> Vec<Find> {
     let mut finds = Vec::new();
     let told = |told| {
         finds.extend(match told {

@@ -98,6 +98,28 @@ async fn a_second_master_is_no_second_drive() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn each_family_is_named_beside_a_master_that_was_heard_before() {
+    for family in Family::BUILT_IN {
+        for every in [310, 400, 490] {
+            let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
+            simulated.add_boxed(5, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap();
+            // He reads of the same drive, and of one that is not there.
+            let requests = vec![(5, vec![3, 0x0C, 0x81, 0, 1]), (9, vec![3, 0, 0, 0, 1])];
+            let second_master = Some(SecondMaster { requests, every: every * MS });
+            simulated.set_defects(Defects { second_master, ..Defects::default() });
+            let plan = at_one("19200 8N1", 1..=9);
+            let open =
+                async |config: LineConfig| Ok(Line::over(simulated.in_memory_at(config.serial), config));
+            let mut sweep = Sweep::new(&plan, LineConfig::stream(SerialSettings::MODBUS_DEFAULT), WAIT, open);
+            sweep.is_shared = true;
+            let finds = found_by(&mut sweep).await;
+            let found = finds.iter().find(|find| find.step.slave.number() == 5).map(|find| &find.answer);
+            assert_eq!(found.and_then(Answer::only), Some(family), "every {every} ms: {finds:?}");
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_master_that_begins_to_ask_behind_the_beginning_ends_a_scan_that_nobody_stands_beside() {
     let (simulated, _) = one();
     let requests = vec![(5, vec![3, 0x0C, 0x81, 0, 1])];

@@ -33,7 +33,7 @@ pub(super) fn chapter(drive: &DriveTold, before: Option<&[Backup]>) -> Markup {
             }
             @if !drive.view.not_known.is_empty() {
                 h4 { "What nobody can know of it" }
-                ul { @for said in &drive.view.not_known { li { (said) } } }
+                ul { @for said in &drive.view.not_known { li { (own(said)) } } }
             }
             h4 { "Faults" }
             (faults(drive))
@@ -76,7 +76,7 @@ fn identity(drive: &DriveTold) -> Markup {
             Err(why) => rows.push((row.name.to_owned(), unread(why))),
         }
     }
-    rows.push(("compared with earlier".to_owned(), cell(values::identity_check(check))));
+    rows.push(("compared with earlier".to_owned(), own(values::identity_check(check))));
     facts(rows)
 }
 
@@ -98,11 +98,11 @@ fn state(drive: &DriveTold) -> Markup {
     let shown = Row::of(&drive.view, Instant::now()).cell(Column::State).to_owned();
     let status = known.status.value.as_ref();
     let mut rows = vec![
-        ("state".to_owned(), cell(shown)),
+        ("state".to_owned(), own(&shown)),
         ("read".to_owned(), read(known.status.quality, status.and_then(|status| status.at))),
     ];
     let mut row = |label: &str, value: Option<String>| {
-        rows.extend(value.map(|value| (label.to_owned(), cell(value))));
+        rows.extend(value.map(|value| (label.to_owned(), own(&value))));
     };
     row("why", known.error.clone());
     for (label, value) in status.into_iter().flat_map(values::status) {
@@ -154,13 +154,13 @@ fn measured(drive: &DriveTold) -> Markup {
         // What it costs to leave out is a family that has no such counter.
         rows.push((label.to_owned(), value.map_or_else(untold, cell)));
     }
-    rows.extend(values::measured(values).into_iter().map(|(label, value)| (label.to_owned(), cell(value))));
+    rows.extend(values::measured(values).into_iter().map(|(label, value)| (label.to_owned(), own(&value))));
     facts(rows)
 }
 
 fn watchdog(drive: &DriveTold) -> Markup {
     let check = &drive.view.snapshot.watchdog;
-    let mut rows = vec![("the program".to_owned(), cell(watched(check)))];
+    let mut rows = vec![("the program".to_owned(), own(&watched(check)))];
     let found = values::found_watchdog(check);
     let time = found.and_then(|found| found.timeout).map(|time| time.as_secs_f64() * 1_000.0);
     let settings = drive.settings.as_ref();
@@ -181,7 +181,7 @@ fn watchdog(drive: &DriveTold) -> Markup {
         let reaction = found.and_then(|found| found.reaction);
         rows.push((
             "reaction".to_owned(),
-            reaction.map_or_else(untold, |reaction| cell(reaction.to_string())),
+            reaction.map_or_else(untold, |reaction| own(&reaction.to_string())),
         ));
     }
     match (settings, feed) {
@@ -251,7 +251,7 @@ fn faults(drive: &DriveTold) -> Markup {
             Some(false) => p { (own("The drive would not accept a reset: its cause is still there.")) },
             _ => {},
         }
-        @for warning in &faults.warnings { p.alarm { (own("Alarm without a trip: ")) (warning) } }
+        @for warning in &faults.warnings { p.alarm { (own("Alarm without a trip: ")) (own(&warning.to_string())) } }
         @if kept == 0 { p.untold { (own("This family keeps no history of faults.")) } }
         @else if faults.history.is_empty() { p { (own("The history of the drive is empty.")) } }
         @else {
@@ -264,20 +264,20 @@ fn present(fault: Option<Fault>, by_watchdog: bool) -> Markup {
     let remedy = fault.and_then(|fault| fault.remedy());
     html! {
         div.trip {
-            p { strong { (own("Tripped: ")) (values::tripped(fault.as_ref())) } @if by_watchdog { (own(", by the communication watchdog")) } }
-            p { (own("What to do: ")) @match remedy { Some(remedy) => (remedy), None => (own("see the manual of the drive")) } }
+            p { strong { (own("Tripped: ")) (own(&values::tripped(fault.as_ref()))) } @if by_watchdog { (own(", by the communication watchdog")) } }
+            p { (own("What to do: ")) @match remedy { Some(remedy) => (own(remedy)), None => (own("see the manual of the drive")) } }
         }
     }
 }
 
 /// A fault of the history, in the order in which the drive keeps it.
 fn past((index, fault): (usize, &Fault)) -> Vec<Markup> {
-    let told = |word: Option<&str>| cell(word.unwrap_or("–"));
     let entry = fault.entry;
+    let told = |word: Option<&str>| word.map_or_else(|| cell("–"), own);
     vec![
         cell(index + 1),
         cell(fault.code),
-        told(entry.map(|entry| entry.mnemonic)),
+        cell(entry.map_or("–", |entry| entry.mnemonic)),
         told(entry.map(|entry| entry.meaning)),
         told(entry.map(|entry| entry.remedy)),
     ]

@@ -43,20 +43,20 @@ pub(super) fn chapter(detail: &LineDetailView, drives: &[DriveTold]) -> Markup {
             h3 { @if line.name == LINE { (own("The line")) } @else { (own("Line ")) (line.name) } }
             p.where { (line.port) ", " (line.protocol) }
             @if line.link == LineLink::Away {
-                p.alarm { (own("The port is away: ")) (line.error.as_deref().unwrap_or("–")) }
+                p.alarm { (own("The port is away: ")) (own(line.error.as_deref().unwrap_or("–"))) }
             }
-            p { (own("Measured since the line was opened: ")) (span(measured.elapsed_ms)) (own(", requests sent: "))
+            p { (own("Measured since the line was opened: ")) (own(&span(measured.elapsed_ms))) (own(", requests sent: "))
                 (line.exchanges) "." }
             @if !line.findings.is_empty() {
                 h4 { "What is wrong with it" }
                 ul { @for finding in &line.findings {
                     li {
                         @if let Some(slave) = finding.slave {
-                            (finding.drive.clone().unwrap_or_else(|| format!("address {slave}"))) ": "
+                            @match &finding.drive { Some(drive) => (drive), None => (own(&format!("address {slave}"))) } ": "
                         }
-                        (finding.text)
-                        @if let Some(what) = &finding.cannot_be_told_from { " (it cannot be told from " (what) ")" }
-                        @for next in &finding.next { "; " (next) }
+                        (own(&finding.text))
+                        @if let Some(what) = &finding.cannot_be_told_from { " (" (own(&format!("it cannot be told from {what}"))) ")" }
+                        @for next in &finding.next { "; " (own(next)) }
                     }
                 } }
             }
@@ -77,7 +77,7 @@ fn plan(detail: &LineDetailView) -> Markup {
     let LineDetailView { line, planned, measured, .. } = detail;
     let row = |figure: &str, planned: String, measured: String, verdict: &str| {
         let verdict = if verdict.is_empty() { cell("") } else { own(verdict) };
-        vec![own(figure), cell(planned), cell(measured), verdict]
+        vec![own(figure), own(&planned), own(&measured), verdict]
     };
     let used = measured.utilisation_percent;
     let longest = measured.stop_wait_ms.map(|waited| waited.max);
@@ -173,6 +173,11 @@ fn slaves(detail: &LineDetailView) -> impl Iterator<Item = (String, &SlaveView, 
     })
 }
 
+/// The name of a slave; what the program says where it has none is its own.
+fn called(name: &str, slave: &SlaveView) -> Markup {
+    if slave.drive.is_some() { cell(name) } else { own(name) }
+}
+
 /// The steps of one slave, each beginning where the one before it ends.
 fn steps(answers: Option<&AnswersView>) -> Vec<Step> {
     let ends = answers.map_or(&[][..], |answers| &answers.times);
@@ -201,7 +206,7 @@ fn answers(detail: &LineDetailView) -> Markup {
             None => html! { span.unread { (own("has not answered")) } },
         };
         vec![
-            cell(name),
+            called(name, slave),
             picture,
             cell(milliseconds(times.map(|times| times.p50))),
             cell(milliseconds(times.map(|times| times.p99))),
@@ -216,21 +221,22 @@ fn answers(detail: &LineDetailView) -> Markup {
 }
 
 fn errors(detail: &LineDetailView) -> Markup {
-    let mut all: Vec<(String, LineErrors, u64)> =
-        slaves(detail).map(|(name, slave, _)| (name, slave.errors, slave.exchanges)).collect();
-    all.push(("all".to_owned(), detail.line.errors, detail.line.exchanges));
+    let mut all: Vec<(String, Markup, LineErrors, u64)> = slaves(detail)
+        .map(|(name, slave, _)| (name.clone(), called(&name, slave), slave.errors, slave.exchanges))
+        .collect();
+    all.push(("all".to_owned(), own("all"), detail.line.errors, detail.line.exchanges));
     let bad = |errors: &LineErrors| errors.of_exchanges().iter().map(|(.., number)| number).sum::<u64>();
     // The bars of all slaves have one scale.
-    let worst = all.iter().max_by(|(_, one, of), (_, other, of_other)| {
+    let worst = all.iter().max_by(|(.., one, of), (.., other, of_other)| {
         (bad(one) * of_other.max(&1)).cmp(&(bad(other) * of.max(&1)))
     });
-    let (worst, of) = worst.map_or((0, 1), |(_, errors, of)| (bad(errors), *of));
-    let rows = all.iter().map(|(name, errors, exchanges)| {
+    let (worst, of) = worst.map_or((0, 1), |(.., errors, of)| (bad(errors), *of));
+    let rows = all.iter().map(|(name, shown, errors, exchanges)| {
         let about = format!("{name}: {} of {exchanges} exchanges went wrong", bad(errors));
         let share_of = |number: u64| number as f64 / (*exchanges).max(1) as f64;
         let drawn = errors.of_exchanges().map(|(key, _, number)| (key, share_of(number)));
         let mut cells = vec![
-            cell(name),
+            cell(shown),
             plot::shares(&drawn, worst.max(1) as f64 / of.max(1) as f64, &about),
             cell(exchanges),
         ];
@@ -263,7 +269,7 @@ fn availability(detail: &LineDetailView, drives: &[DriveTold]) -> Markup {
         };
         let about = format!("{name}: {answered} of {polls} statuses came");
         vec![
-            cell(name),
+            called(&name, slave),
             plot::shares(&[("good", answered as f64)], polls.max(1) as f64, &about),
             cell(share(answered, polls)),
             cell(polls),

@@ -80,8 +80,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE|FOLDER", conflicts_with = "without_parameters")]
     before: Vec<PathBuf>,
     /// What stands at its head, such as the plant and its line
-    #[arg(long, value_name = "TEXT", default_value = "Report on drives")]
-    title: String,
+    #[arg(long, value_name = "TEXT")]
+    title: Option<String>,
     /// What else is to be said: why, an order number; may be given several times
     #[arg(long = "note", value_name = "TEXT")]
     notes: Vec<String>,
@@ -101,6 +101,9 @@ enum Language {
     En,
     Fr,
 }
+
+/// What stands at the head of a report that is given no title.
+const TITLE: &str = "Report on drives";
 
 /// Who tells it where no daemon does.
 const THE_LINE: &str = "the line itself, watched for this report; nothing was written to it";
@@ -123,7 +126,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     }
     let gathered = gathered?;
     let page = Page {
-        title: &args.title,
+        title: args.title.as_deref().unwrap_or(TITLE),
         notes: &args.notes,
         parties: Parties { customer: args.customer.as_deref(), technician: args.technician.as_deref() },
         before: (!args.before.is_empty()).then_some(&before),

@@ -10,7 +10,6 @@ use super::{
     words::{facts, moment, own, unread},
 };
 use crate::commands::param::file::Backup;
-use drived_words::output;
 
 /// How it looks, on a screen and on A4.
 const STYLE: &str = include_str!("report.css");
@@ -48,11 +47,11 @@ impl Page<'_> {
                     meta charset="utf-8";
                     meta name="viewport" content="width=device-width, initial-scale=1";
                     meta name="color-scheme" content="light";
-                    title { (self.title) }
+                    title.own[self.is_untitled()] { (self.title) }
                     style { (PreEscaped(STYLE)) }
                 }
                 body {
-                    header { h1 { (self.title) } (self.head()) }
+                    header { h1 { @if self.is_untitled() { (own(self.title)) } @else { (self.title) } } (self.head()) }
                     main {
                         section { h2 { "What needs attention" } (summary::attention(self.gathered)) }
                         section { h2 { "The drives at a glance" } (summary::overview(self.gathered)) }
@@ -75,6 +74,11 @@ impl Page<'_> {
         }
     }
 
+    /// Whether its title is the program's.
+    fn is_untitled(&self) -> bool {
+        self.title == super::TITLE
+    }
+
     fn head(&self) -> Markup {
         let daemon = &self.gathered.state.daemon;
         let drives = self.gathered.drives.len();
@@ -91,14 +95,12 @@ impl Page<'_> {
             ),
             (
                 "running since".to_owned(),
-                html! { (moment(daemon.started_unix_ms)) ", drived " (daemon.version) },
+                html! { (own(&moment(daemon.started_unix_ms))) ", drived " (daemon.version) },
             ),
+            ("lines".to_owned(), html! { (self.gathered.lines.len()) }),
             (
                 "drives".to_owned(),
-                html! {
-                    (output::counted(drives, "drive", "drives")) " on " (output::counted(self.gathered.lines.len(), "line", "lines"))
-                    @if silent > 0 { ", " strong { (silent) " of them without an answer" } }
-                },
+                html! { (drives) @if silent > 0 { ", " strong { (own("without an answer: ")) (silent) } } },
             ),
         ]);
         rows.extend(self.notes.iter().map(|note| ("note".to_owned(), html! { (note) })));
@@ -142,5 +144,5 @@ const READING: [&str; 5] = [
     "“not read” says that something was asked for and did not come, with the reason; “not told by this family” that its manual has no such value; “–” that there is nothing to count yet.",
     "Factory settings are those of the manuals. A parameter for which the manual prints a rule instead of a number cannot be judged, and stands in a list of its own.",
     "A figure of the plan is the longest there can be while no commands are given. “as the line has been” is the same with the answer times that were measured.",
-    "States, faults and the words of the program are as the program and the manuals say them.",
+    "Registers and their values are called as in the manuals of the drives; the mnemonic is that of the drive's display.",
 ];

@@ -65,7 +65,7 @@ fn unjudged(difference: &Difference) -> Vec<Markup> {
     let why = match (held, factory) {
         (Cell::Unread(_), _) => own("it could not be read"),
         (Cell::Lacks, _) => own("the drive was not asked for it"),
-        (_, Cell::Unread(rule)) => html! { (rule) },
+        (_, Cell::Unread(rule)) => own(rule),
         (_, _) => own("the manual prints no factory setting"),
     };
     vec![cell(difference.row.code), cell(difference.row.name), shown(held), why]

@@ -63,7 +63,7 @@ pub(super) fn answer_times(axis: Axis, steps: &[Step], about: &str) -> Markup {
     let most = steps.iter().map(|step| step.count).fold(0.0, f64::max);
     html! {
         svg.plot role="img" viewBox=(format!("0 0 {WIDTH} {}", HEIGHT + AXIS)) width=(WIDTH) height=(HEIGHT + AXIS) {
-            title { (about) }
+            title.own { (about) }
             @for tick in axis.ticks() {
                 @let x = format!("{:.1}", axis.at(tick));
                 line.grid x1=(x) x2=(x) y1="0" y2=(HEIGHT) {}
@@ -106,7 +106,7 @@ pub(super) fn shares(parts: &[(&str, f64)], whole: f64, about: &str) -> Markup {
     }
     html! {
         svg.plot role="img" viewBox=(format!("0 0 {LONG} {HIGH}")) width=(LONG) height=(HIGH) {
-            title { (about) }
+            title.own { (about) }
             rect.whole x="0" y="0" width=(LONG) height=(HIGH) {}
             @for (class, left, width) in bars {
                 rect class=(class) x=(format!("{left:.1}")) y="0" width=(format!("{width:.1}")) height=(HIGH) {}

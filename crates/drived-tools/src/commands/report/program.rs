@@ -48,7 +48,7 @@ fn rows(told: &SettingsView) -> Vec<(String, Markup)> {
         (told.measurements_age_ms, "the same of measured values"),
     ] {
         let age = age.map_or_else(|| "no limit, or none are read".to_owned(), milliseconds);
-        rows.push((label.to_owned(), cell(age)));
+        rows.push((label.to_owned(), own(&age)));
     }
     rows
 }
@@ -61,15 +61,15 @@ fn spoken(text: &str) -> String {
 /// Each value of an object in a row of its own, under the names that lead to it.
 fn flatten(label: &str, value: &Value, rows: &mut Vec<(String, Markup)>) {
     match value {
-        Value::Object(members) if members.is_empty() => rows.push((label.to_owned(), cell("none"))),
+        Value::Object(members) if members.is_empty() => rows.push((label.to_owned(), own("none"))),
         Value::Object(members) => {
             for (key, value) in members {
                 flatten(&format!("{label}: {}", spoken(key)), value, rows);
             }
         }
-        Value::Array(all) if all.is_empty() => rows.push((label.to_owned(), cell("none"))),
+        Value::Array(all) if all.is_empty() => rows.push((label.to_owned(), own("none"))),
         Value::Array(all) => {
-            rows.push((label.to_owned(), cell(all.iter().map(plain).collect::<Vec<_>>().join(", "))));
+            rows.push((label.to_owned(), own(&all.iter().map(plain).collect::<Vec<_>>().join(", "))));
         }
         Value::Number(_) => {
             let (name, shown) = match label.rsplit_once(' ') {
@@ -81,7 +81,7 @@ fn flatten(label: &str, value: &Value, rows: &mut Vec<(String, Markup)>) {
             };
             rows.push((name.to_owned(), cell(shown)));
         }
-        _ => rows.push((label.to_owned(), cell(plain(value)))),
+        _ => rows.push((label.to_owned(), own(&plain(value)))),
     }
 }
 
@@ -109,8 +109,8 @@ pub(super) fn alarms(events: &Told<Vec<RecentView>>, names: &[&str]) -> Markup {
         .collect();
     let shown = all.iter().rev().take(ALARMS);
     let row = |event: &HappenedView| {
-        let drive = event.drive.as_deref().unwrap_or("the program");
-        vec![cell(moment(event.time_unix_ms)), cell(drive), cell(&event.text)]
+        let drive = event.drive.as_deref().map_or_else(|| own("the program"), cell);
+        vec![cell(moment(event.time_unix_ms)), drive, own(&event.text)]
     };
     html! {
         @if all.is_empty() { p { (own("None among the last events that the program remembers: ")) (events.len()) "." } }

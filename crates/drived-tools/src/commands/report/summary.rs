@@ -33,7 +33,7 @@ pub(super) fn overview(gathered: &Gathered) -> Markup {
             html! { a href={ "#" (drive.anchor()) } { (drive.name()) } },
             cell(drive.family_name()),
             html! { (view.line) ", " (view.slave) },
-            html! { span.trouble[row.is_in_trouble()] { (row.cell(Column::State)) } },
+            html! { span.trouble[row.is_in_trouble()] { (own(row.cell(Column::State))) } },
             cell(share(answered, polls)),
             cell(running_time.1.unwrap_or_else(|| "–".to_owned())),
             differs,
@@ -62,8 +62,8 @@ pub(super) fn attention(gathered: &Gathered) -> Markup {
         } @else {
             ul {
                 @for (finding, drives) in &all { li {
-                    @if finding.grade == Grade::Severe { strong { (finding.what) } } @else { (finding.what) }
-                    @if !finding.more.is_empty() { ": " (finding.more) }
+                    @if finding.grade == Grade::Severe { strong { (own(&finding.what)) } } @else { (own(&finding.what)) }
+                    @if !finding.more.is_empty() { ": " (own(&finding.more)) }
                     " – "
                     @for (index, drive) in drives.iter().enumerate() {
                         @if index > 0 { ", " } a href={ "#" (drive.anchor()) } { (drive.name()) }
@@ -141,7 +141,7 @@ fn of_line(detail: &Told<LineDetailView>) -> Vec<Markup> {
     let mut told = Vec::new();
     let mut say = |what: Markup| told.push(html! { (own("line ")) (line.name) ": " (what) });
     if line.link == LineLink::Away {
-        say(html! { strong { (own("its port is away")) } ": " (line.error.as_deref().unwrap_or("–")) });
+        say(html! { strong { (own("its port is away")) } ": " (own(line.error.as_deref().unwrap_or("–"))) });
     }
     for (_, name, number) in line.errors.of_exchanges() {
         if number * OFTEN > line.exchanges {

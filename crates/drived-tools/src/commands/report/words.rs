@@ -17,7 +17,7 @@ pub(super) fn own(text: &str) -> Markup {
 
 /// What was not read, and why.
 pub(super) fn unread(why: &str) -> Markup {
-    html! { span.unread { (own("not read: ")) (why) } }
+    html! { span.unread { (own("not read: ")) (own(why)) } }
 }
 
 /// What a drive does not have to tell.

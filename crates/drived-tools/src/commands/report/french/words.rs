@@ -1,61 +1,132 @@
-//! The words of a report in French. What a drive, its manual or its owner says stays as it was said.
-
-/// A document whose own words are French: headings, labels, heads of tables, and sentences that are marked as the program's.
-pub(super) fn translated(html: &str) -> String {
-    let mut text = String::with_capacity(html.len() + html.len() / 8);
-    let mut rest = html;
-    while let Some((at, open, close)) = next(rest) {
-        let begin = at + open;
-        let Some(length) = rest[begin..].find(close) else { break };
-        let said = &rest[begin..begin + length];
-        text.push_str(&rest[..begin]);
-        text.push_str(french(said).unwrap_or(said));
-        rest = &rest[begin + length..];
-    }
-    text.push_str(rest);
-    text.replacen("<html lang=\"en\">", "<html lang=\"fr\">", 1)
-}
-
-/// What of a document is the program's own and has no French words: nothing, in a document of known parts.
-#[cfg(test)]
-pub(super) fn untranslated(html: &str) -> Vec<String> {
-    let (mut all, mut rest) = (Vec::new(), html);
-    while let Some((at, open, close)) = next(rest) {
-        let begin = at + open;
-        let length = rest[begin..].find(close).unwrap();
-        let said = &rest[begin..begin + length];
-        if french(said).is_none() {
-            all.push(said.to_owned());
-        }
-        rest = &rest[begin + length..];
-    }
-    all
-}
-
-/// The elements whose text is the program's own.
-const OURS: [(&str, &str); 8] = [
-    ("<h2>", "</h2>"),
-    ("<h2 class=\"new\">", "</h2>"),
-    ("<h4>", "</h4>"),
-    ("<th scope=\"row\">", "</th>"),
-    ("<th scope=\"col\">", "</th>"),
-    ("<th scope=\"col\" class=\"number\">", "</th>"),
-    ("<span class=\"own\">", "</span>"),
-    ("<summary>", "</summary>"),
-];
-
-/// Where the next of them begins, how long its tag is, and how it ends.
-fn next(html: &str) -> Option<(usize, usize, &'static str)> {
-    let found = OURS.iter().filter_map(|(open, close)| Some((html.find(open)?, open.len(), *close)));
-    found.min_by_key(|(at, ..)| *at)
-}
-
-fn french(english: &str) -> Option<&'static str> {
-    WORDS.iter().find(|(known, _)| *known == english).map(|(_, french)| *french)
-}
+//! What stands in a report and nowhere else, in French.
 
 /// English as it stands in the document, and French.
-const WORDS: &[(&str, &str)] = &[
+pub(super) const WORDS: &[(&str, &str)] = &[
+    // What is written of a drive.
+    ("Report on drives", "Rapport sur les variateurs"),
+    ("lines", "lignes"),
+    ("without an answer: ", "sans réponse : "),
+    ("all", "tous"),
+    ("an unknown time", "une durée inconnue"),
+    ("the drive that the program knows", "le variateur que le programme connaît"),
+    (
+        "ANOTHER DRIVE than the one that the program knows",
+        "UN AUTRE VARIATEUR que celui que le programme connaît",
+    ),
+    (
+        "A DRIVE OF ANOTHER FAMILY than it is configured as",
+        "UN VARIATEUR D’UNE AUTRE FAMILLE que celle qui est déclarée",
+    ),
+    (
+        "a drive of this family cannot be told from another of its kind",
+        "un variateur de cette famille ne se distingue pas d’un autre du même type",
+    ),
+    ("not checked yet", "pas encore contrôlé"),
+    ("not known yet", "pas encore connu"),
+    ("never", "jamais"),
+    ("once", "une fois"),
+    ("none", "aucun"),
+    ("present", "présent"),
+    ("set up by the settings, and verified", "réglée selon les réglages, et vérifiée"),
+    (
+        "is set otherwise than the settings say, until the motor stands",
+        "est réglée autrement que les réglages ne le disent, jusqu’à l’arrêt du moteur",
+    ),
+    (
+        "the settings leave it as it is; as it was found it is fed",
+        "les réglages la laissent telle quelle ; telle qu’elle a été trouvée, elle est alimentée",
+    ),
+    ("not read yet", "pas encore lu"),
+    ("the drive did not answer", "le variateur n’a pas répondu"),
+    ("left out, as was asked", "laissé de côté, comme demandé"),
+    (
+        "the drive was not asked yet, or did not answer",
+        "le variateur n’a pas encore été interrogé, ou n’a pas répondu",
+    ),
+    (
+        "the drive has not told it since the program started",
+        "le variateur ne l’a pas communiqué depuis le démarrage du programme",
+    ),
+    ("by which fault is not read yet", "par quel défaut n’est pas encore lu"),
+    (
+        "some are from before the trip, and stand in the drive's words alone",
+        "certaines datent d’avant le déclenchement et ne figurent que dans les mots du variateur",
+    ),
+    ("the communication watchdog is off", "la surveillance de la communication est désactivée"),
+    (
+        "the communication watchdog may run out between two frames",
+        "la surveillance de la communication peut expirer entre deux trames",
+    ),
+    ("parameters that could not be read", "paramètres qui n’ont pas pu être lus"),
+    ("no stop was sent", "aucun arrêt n’a été envoyé"),
+    ("no limit, or none are read", "pas de limite, ou aucune n’est lue"),
+    // What a drive does when nobody speaks to it.
+    ("nothing", "rien"),
+    ("freewheel", "roue libre"),
+    ("ramp stop", "arrêt sur rampe"),
+    ("fast stop", "arrêt rapide"),
+    ("DC injection", "injection de courant continu"),
+    ("freewheel stop", "arrêt roue libre"),
+    ("DC injection stop", "arrêt par injection de courant continu"),
+    (
+        "trip (how the motor stops is not in the manual)",
+        "défaut (le manuel ne dit pas comment le moteur s’arrête)",
+    ),
+    // The settings of the program.
+    ("settings", "réglages"),
+    ("accept resume", "reprise acceptée"),
+    ("accept self restart", "redémarrage autonome accepté"),
+    ("alarms", "alarmes"),
+    ("alarms: current", "alarmes : courant"),
+    ("alarms: drive thermal", "alarmes : état thermique du variateur"),
+    ("alarms: motor thermal", "alarmes : état thermique du moteur"),
+    ("coast", "temps en roue libre"),
+    ("commanders", "qui peut commander"),
+    ("commanders: only", "qui peut commander : seulement"),
+    ("anyone", "tout le monde"),
+    ("injection", "temps d’injection"),
+    ("limits: low", "limites : basse"),
+    ("limits: high", "limites : haute"),
+    ("limits: forbidden hz", "limites : interdites, en Hz"),
+    ("limits: step", "limites : pas"),
+    ("on control taken", "si la commande est prise"),
+    ("on exit", "à la fin du programme"),
+    ("on exit: stop", "à la fin du programme : arrêt"),
+    ("on exit: release", "à la fin du programme : commande rendue, arrêt"),
+    ("on exit adopted", "à la fin, moteur trouvé en marche"),
+    ("on exit adopted: stop", "à la fin, moteur trouvé en marche : arrêt"),
+    ("on exit watchdog", "à la fin, surveillance"),
+    ("on fault", "en cas de défaut"),
+    ("on loss", "en cas de perte de liaison"),
+    ("on loss: stop", "en cas de perte de liaison : arrêt"),
+    ("periods: max age", "périodes : âge maximal"),
+    ("periods: rest", "périodes : à l’arrêt"),
+    ("periods: running", "périodes : en marche"),
+    ("periods: slow", "périodes : valeurs lentes"),
+    ("times: effect", "délais : effet"),
+    ("times: lifetime", "délais : durée de vie"),
+    ("times: reference", "délais : consigne"),
+    ("times: standstill", "délais : arrêt du moteur"),
+    ("times: stop alarm", "délais : alarme d’arrêt"),
+    ("watchdog: reaction", "surveillance : réaction"),
+    ("watchdog: timeout", "surveillance : délai"),
+    (
+        "by the plan, a status is never older, running",
+        "selon le plan, un état n’est jamais plus vieux, en marche",
+    ),
+    ("the same at rest", "de même à l’arrêt"),
+    ("the same of measured values", "de même pour les valeurs mesurées"),
+    ("leave", "laisser"),
+    ("report", "signaler"),
+    ("reset watchdog trip", "acquitter le défaut de surveillance"),
+    ("restore", "rétablir"),
+    ("restore in ram", "rétablir en RAM"),
+    ("withdraw", "retirer l’ordre"),
+    // Rules of the manuals.
+    ("by the drive's rating", "selon le calibre du variateur"),
+    // What the line says.
+    ("no drive of the program", "aucun variateur du programme"),
+    ("watchdog not in force", "surveillance inactive"),
     // Headings.
     ("What needs attention", "Ce qui demande attention"),
     ("The drives at a glance", "Les variateurs en un coup d’œil"),
@@ -306,11 +377,11 @@ const WORDS: &[(&str, &str)] = &[
     (
         "A figure of the plan is the longest there can be while no commands are given. “as the line has been” is the same with the \
          answer times that were measured.",
-        "Une grandeur du plan est la plus longue possible tant qu’aucune commande n’est donnée. « as the line has been » est la même avec \
+        "Une grandeur du plan est la plus longue possible tant qu’aucune commande n’est donnée. « avec la ligne telle qu’elle a été » est la même avec \
          les temps de réponse mesurés.",
     ),
     (
-        "States, faults and the words of the program are as the program and the manuals say them.",
-        "États, défauts et paroles du programme sont tels que le programme et les manuels les disent, en anglais.",
+        "Registers and their values are called as in the manuals of the drives; the mnemonic is that of the drive's display.",
+        "Registres et valeurs portent les noms des manuels en anglais des variateurs ; la mnémonique est celle de l’afficheur.",
     ),
 ];
