@@ -125,6 +125,9 @@ enum Part {
         /// So many drives on each.
         #[arg(long, default_value_t = 31)]
         drives: u8,
+        /// A small one against each planted defect, or one of them by its name; those in the line and the fleet need `--features plants`.
+        #[arg(long, num_args = 0..=1, default_missing_value = "")]
+        plants: Option<String>,
     },
     /// The tests that could not run for want of something, when they were run last.
     Skipped,
@@ -188,11 +191,9 @@ fn main() -> ExitCode {
     let go_on = move || end.is_none_or(|end| Instant::now() < end);
     end_what_is_stuck();
     let Some(part) = part else {
-        let told = all::run(seed, end.is_some(), go_on, |round, told| {
-            println!("-- round {round}");
-            told.iter().for_each(|told| print!("{told}"));
-        });
-        return found_nothing(&told);
+        let summary = all::run(seed, end, |line| println!("{}", line.trim_end()));
+        print!("\n{summary}");
+        return if summary.found() == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE };
     };
     let told: Vec<Told> = match part {
         Part::Matrix { cell: Some(name), .. } => {
@@ -259,7 +260,7 @@ fn main() -> ExitCode {
                 return ExitCode::FAILURE;
             };
             println!("{}", story.in_words());
-            println!("{:#?}", matrix::tell(&story, &*matrix::drive_of(story.subject)));
+            println!("{:#?}", matrix::tell(&story, &*matrix::drive_of(story.subject.family())));
             return ExitCode::SUCCESS;
         }
         Part::Worlds { plants: Some(only), stories, .. } => {
@@ -270,11 +271,14 @@ fn main() -> ExitCode {
         Part::Mutants { hunt: Some(only) } => {
             return ended(mutation::hunt(&root(), Some(&*only).filter(|only| !only.is_empty())));
         }
-        Part::Mutants { hunt: None } => match mutation::run(&root(), go_on) {
+        Part::Mutants { hunt: None } => match mutation::run(&root(), 0, go_on) {
             Ok(told) => vec![told],
             Err(error) => return ended(Err(error)),
         },
-        Part::Soak { hours, lines, drives } => {
+        Part::Soak { plants: Some(only), .. } => {
+            vec![soak::find_plants(seed, Some(&*only).filter(|only| !only.is_empty()))]
+        }
+        Part::Soak { hours, lines, drives, .. } => {
             vec![soak::run(
                 seed,
                 soak::Size { lines, drives, time: Duration::from_secs(3_600 * hours) },

@@ -15,6 +15,11 @@ pub fn begins(what: &impl fmt::Display) {
     *UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner) = Some((what.to_string(), Instant::now()));
 }
 
+/// Nothing is under way that could go round for ever.
+pub fn ends() {
+    *UNDER_WAY.lock().unwrap_or_else(PoisonError::into_inner) = None;
+}
+
 /// What is under way for longer than this in real time: it goes round where virtual time stands still, and nothing else ends it.
 #[must_use]
 pub fn stuck(longest: Duration) -> Option<String> {
@@ -96,6 +101,17 @@ impl Told {
         }
     }
 
+    /// What it tried and found, in one line.
+    #[must_use]
+    pub fn in_a_line(&self) -> String {
+        let Self { part, unit, count, finds, plants, took, .. } = self;
+        let planted = match plants.len() {
+            0 => String::new(),
+            all => format!(", {} of {all} planted defects found", self.plants_found()),
+        };
+        format!("{part}: {count} {unit} in {:.1} s, {} found{planted}", took.as_secs_f64(), finds.len())
+    }
+
     /// How many of the planted defects were found.
     #[must_use]
     pub fn plants_found(&self) -> usize {
@@ -105,8 +121,8 @@ impl Told {
 
 impl fmt::Display for Told {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { part, unit, count, finds, plants, tally, details, took } = self;
-        writeln!(f, "{part}: {count} {unit} in {:.1} s, {} found", took.as_secs_f64(), finds.len())?;
+        let Self { finds, plants, tally, details, .. } = self;
+        writeln!(f, "{}", self.in_a_line())?;
         for (what, times) in tally {
             writeln!(f, "  {times:>9} {what}")?;
         }
@@ -114,7 +130,6 @@ impl fmt::Display for Told {
             writeln!(f, "  {line}")?;
         }
         if !plants.is_empty() {
-            writeln!(f, "  planted defects: {} of {} found", self.plants_found(), plants.len())?;
             for Plant { name, found_by } in plants {
                 match found_by {
                     Some(by) => writeln!(f, "    found  {name}, by {by}")?,
@@ -122,13 +137,17 @@ impl fmt::Display for Told {
                 }
             }
         }
-        for Find { what, replay } in finds {
-            writeln!(
-                f,
-                "  FOUND {what}\n    again by: cargo run -p drive-fire -- {}",
-                replay.trim_start_matches("drive-fire ")
-            )?;
+        finds.iter().try_for_each(|find| write!(f, "{find}"))
+    }
+}
+
+impl fmt::Display for Find {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { what, replay } = self;
+        writeln!(f, "  FOUND {what}")?;
+        match replay.strip_prefix("drive-fire ") {
+            Some(part) => writeln!(f, "    again by: cargo run -p drive-fire -- {part}"),
+            None => writeln!(f, "    again by: {replay}"),
         }
-        Ok(())
     }
 }

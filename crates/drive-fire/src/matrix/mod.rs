@@ -23,21 +23,26 @@ pub use axes::{Event, FarEnd, Operation, Subject, Way};
 pub use cell::{Cell, Plane};
 pub use fault::Fault;
 pub use live::{Lived, live, tell};
+#[cfg(feature = "plants")]
+pub(crate) use plants::at_a_line;
+pub(crate) use plants::{Planted, all as planted};
 pub use plants::{find_again, find_plants, find_plants_by_stories};
 pub use untold::Untold;
+
+use drive_families::Family;
+use drive_testing::contract::Open;
 
 use crate::report::{self, Find, Told};
 
 /// The drive of a cell as its family makes it.
 #[must_use]
-pub fn open(cell: &Cell) -> Box<drive_testing::contract::Open> {
-    drive_of(cell.subject)
+pub fn open(cell: &Cell) -> Box<Open> {
+    drive_of(cell.subject.family())
 }
 
-/// The same of a subject.
+/// The same of a family.
 #[must_use]
-pub fn drive_of(subject: Subject) -> Box<drive_testing::contract::Open> {
-    let family = subject.family();
+pub fn drive_of(family: Family) -> Box<Open> {
     Box::new(move |port, slave| family.open_with(port, slave, &family.simulated_options()))
 }
 
@@ -79,6 +84,7 @@ pub fn run(seed: u64, of_each: u64, mut go_on: impl FnMut() -> bool) -> Told {
             true
         });
     }
+    report::ends();
     told.took = begun.elapsed();
     told
 }

@@ -195,21 +195,23 @@ pub fn run(seed: u64, stories: u64, mut go_on: impl FnMut() -> bool) -> Told {
         told.count += 1;
         crate::report::begins(&story);
         told.count_as("steps", story.steps.len() as u64);
-        match tell(&story, &*crate::matrix::drive_of(story.subject)) {
+        match tell(&story, &*crate::matrix::drive_of(story.subject.family())) {
             Lived::Against(why) => told.finds.push(found(&story, &why)),
             Lived::BeyondTelling(_) => told.count_as("stories wrong where nobody can tell", 1),
             _ => {}
         }
     }
+    crate::report::ends();
     told.took = begun.elapsed();
     told
 }
 
 fn found(story: &Story, why: &[String]) -> Find {
-    let is_wrong =
-        |story: &Story| matches!(tell(story, &*crate::matrix::drive_of(story.subject)), Lived::Against(_));
+    let is_wrong = |story: &Story| {
+        matches!(tell(story, &*crate::matrix::drive_of(story.subject.family())), Lived::Against(_))
+    };
     let shrunk = story.shrunk(is_wrong);
-    let why = match tell(&shrunk, &*crate::matrix::drive_of(shrunk.subject)) {
+    let why = match tell(&shrunk, &*crate::matrix::drive_of(shrunk.subject.family())) {
         Lived::Against(why) => why,
         _ => why.to_vec(),
     };

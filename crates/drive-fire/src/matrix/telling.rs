@@ -18,6 +18,8 @@ use super::{
 struct Done {
     /// A start was asked for, whatever became of it.
     started: bool,
+    /// Control was to be given back, whatever became of it.
+    released: bool,
     touched: bool,
 }
 
@@ -91,6 +93,7 @@ async fn ask(story: &Story, stage: &mut Stage, operation: Operation, done: &mut 
         _ => {}
     }
     done.started |= matches!(operation, Operation::Start(_));
+    done.released |= operation == Operation::Release;
     if matches!(operation, Operation::Stop(_)) && told.is_ok() && !done.touched {
         // Behind a confirmed stop it steers for nothing, or comes down.
         let before = seen.output_frequency.abs();
@@ -117,6 +120,10 @@ fn at_the_end(stage: &Stage, done: &Done) {
         return;
     }
     if stage.drive.lease().is_none() {
+        // Whom it was released to commands it, and the twin was released to nobody.
+        if done.released {
+            return;
+        }
         notes.object(format!("it moves and no lease stands: {seen:?}"));
     } else if !done.started {
         notes.object(format!("nobody has started it: {seen:?}"));

@@ -15,10 +15,10 @@ use drive_core::{Class, Terms};
 use tokio::time::Instant;
 use tokio_modbus::{Request, Response};
 
-use super::{Held, Model, names};
+use super::{Held, Model, clock::Clocked, names};
 
 /// As it is explored.
-pub(super) const MODEL: Model = Model {
+pub(crate) const MODEL: Model = Model {
     name: "gateway",
     part: "model of a gateway",
     against_plants: "model of a gateway, against planted defects",
@@ -222,71 +222,6 @@ impl World {
         self.run_for(Duration::ZERO)
     }
 
-    fn run_for(&mut self, time: Duration) -> Held {
-        let until = self.now + time;
-        while self.goes_on_before(until)? {}
-        self.now = self.now.max(until);
-        Ok(())
-    }
-
-    /// The next thing that happens by itself before `until`; false: nothing.
-    fn goes_on_before(&mut self, until: Instant) -> Result<bool, &'static str> {
-        self.master.handle_timeout(self.now);
-        self.collect()?;
-        if let Some(frame) = self.master.poll_transmit(self.now) {
-            self.transmitted(&frame)?;
-            self.master.handle_sent(self.now);
-            return Ok(true);
-        }
-        let done = self.at.as_ref().map(|(_, done, _)| *done);
-        let next = [self.master.deadline(), done].into_iter().flatten().min();
-        let Some(next) = next.filter(|next| *next <= until) else { return Ok(false) };
-        if done.is_some_and(|done| done <= next) {
-            self.now = self.now.max(next);
-            self.gateway_is_done()?;
-            return Ok(true);
-        }
-        if next <= self.now {
-            return Ok(false);
-        }
-        self.now = next;
-        Ok(true)
-    }
-
-    fn transmitted(&mut self, frame: &[u8]) -> Held {
-        let [a, b, 0, 0, _, _, slave, pdu @ ..] = frame else { return Err("it is a frame of Modbus TCP") };
-        let is_stop = matches!(pdu, [6, 0, at, ..] if u16::from(*at) == STOP);
-        let is_known = self.setting != Setting::Unknown;
-        if is_known && !is_stop && self.at.is_some() {
-            return Err(
-                "a gateway that does one thing at a time is given nothing but a stop while it is at a question",
-            );
-        }
-        // One that is given behind another has that one under way before it.
-        let stops = self.calls.values().filter(|call| call.is_stop).count();
-        let call = self.calls.values_mut().find(|call| !call.sent && call.slave == *slave && call.pdu == pdu);
-        if let Some(call) = call {
-            call.sent = true;
-            let waited = self.now - call.at;
-            let most = self.config.worst_case_stop(8, 32);
-            if call.is_stop && stops == 1 && waited > TIMEOUT + 20 * MS {
-                return Err("a stop waits for the exchange under way and for nothing else");
-            }
-            // Repetitions to one that is off-line have their share of the line.
-            if call.is_stop && (stops == 1 || call.slave == 1) && waited > most {
-                return Err("a stop waits no longer than the printed bound");
-            }
-        }
-        let connection = self.connection;
-        self.queue.push_back(Question {
-            transaction: [*a, *b],
-            slave: *slave,
-            pdu: pdu.to_vec(),
-            connection,
-        });
-        self.next_question()
-    }
-
     /// It goes on with what waits.
     fn next_question(&mut self) -> Held {
         if self.at.is_some() {
@@ -307,49 +242,6 @@ impl World {
         }
         self.at = Some((question, self.now + takes, lives));
         Ok(())
-    }
-
-    fn gateway_is_done(&mut self) -> Held {
-        let Some((question, _, answers)) = self.at.take() else { return Ok(()) };
-        let Question { transaction: [a, b], slave, pdu, connection } = question;
-        let answer = match (answers, self.setting) {
-            (false, Setting::Silent) => None,
-            (false, _) => Some(vec![pdu[0] | 0x80, 0x0B]),
-            (true, _) if pdu[0] == 3 => {
-                self.number += 1;
-                let words = [self.number, u16::from(slave)].into_iter().chain(std::iter::repeat(0));
-                let count = pdu.last().copied().unwrap_or_default();
-                let data = words.take(count.into()).flat_map(u16::to_be_bytes);
-                Some([3, 2 * count].into_iter().chain(data).collect())
-            }
-            (true, _) => Some(pdu),
-        };
-        if let Some(answer) = answer.filter(|_| connection == self.connection) {
-            let [high, low] = (answer.len() as u16 + 1).to_be_bytes();
-            let frame = [&[a, b, 0, 0, high, low, slave], &answer[..]].concat();
-            self.master.handle_bytes(self.now, &frame);
-            self.collect()?;
-        }
-        self.next_question()
-    }
-
-    fn collect(&mut self) -> Held {
-        while let Some((id, outcome)) = self.master.poll_outcome() {
-            let Some(call) = self.calls.get_mut(&id) else {
-                return Err("an outcome of a call that nobody made");
-            };
-            if call.outcome.is_some() {
-                return Err("a call ends once");
-            }
-            if let Ok(Ok(Response::ReadHoldingRegisters(words))) = &outcome {
-                // The newest answer is the only one that can be that to a question of now.
-                if words[..] != [self.number, u16::from(call.slave)] {
-                    return Err("a value is the answer to its own question");
-                }
-            }
-            call.outcome = Some(outcome);
-        }
-        self.knows_no_more_than_there_is()
     }
 
     fn far_end(&self) -> Option<FarEndStats> {
@@ -395,6 +287,98 @@ impl World {
             }
         }
         Err("a drive that answers again is asked again")
+    }
+}
+
+impl Clocked for World {
+    fn master(&mut self) -> &mut Master<u32> {
+        &mut self.master
+    }
+
+    fn now(&mut self) -> &mut Instant {
+        &mut self.now
+    }
+
+    /// When the gateway is done with what it is at.
+    fn next(&self) -> Option<Instant> {
+        self.at.as_ref().map(|(_, done, _)| *done)
+    }
+
+    fn happens(&mut self) -> Held {
+        let Some((question, _, answers)) = self.at.take() else { return Ok(()) };
+        let Question { transaction: [a, b], slave, pdu, connection } = question;
+        let answer = match (answers, self.setting) {
+            (false, Setting::Silent) => None,
+            (false, _) => Some(vec![pdu[0] | 0x80, 0x0B]),
+            (true, _) if pdu[0] == 3 => {
+                self.number += 1;
+                let words = [self.number, u16::from(slave)].into_iter().chain(std::iter::repeat(0));
+                let count = pdu.last().copied().unwrap_or_default();
+                let data = words.take(count.into()).flat_map(u16::to_be_bytes);
+                Some([3, 2 * count].into_iter().chain(data).collect())
+            }
+            (true, _) => Some(pdu),
+        };
+        if let Some(answer) = answer.filter(|_| connection == self.connection) {
+            let [high, low] = (answer.len() as u16 + 1).to_be_bytes();
+            let frame = [&[a, b, 0, 0, high, low, slave], &answer[..]].concat();
+            self.master.handle_bytes(self.now, &frame);
+            self.collect()?;
+        }
+        self.next_question()
+    }
+
+    fn transmitted(&mut self, frame: &[u8]) -> Held {
+        let [a, b, 0, 0, _, _, slave, pdu @ ..] = frame else { return Err("it is a frame of Modbus TCP") };
+        let is_stop = matches!(pdu, [6, 0, at, ..] if u16::from(*at) == STOP);
+        let is_known = self.setting != Setting::Unknown;
+        if is_known && !is_stop && self.at.is_some() {
+            return Err(
+                "a gateway that does one thing at a time is given nothing but a stop while it is at a question",
+            );
+        }
+        // One that is given behind another has that one under way before it.
+        let stops = self.calls.values().filter(|call| call.is_stop).count();
+        let call = self.calls.values_mut().find(|call| !call.sent && call.slave == *slave && call.pdu == pdu);
+        if let Some(call) = call {
+            call.sent = true;
+            let waited = self.now - call.at;
+            let most = self.config.worst_case_stop(8, 32);
+            if call.is_stop && stops == 1 && waited > TIMEOUT + 20 * MS {
+                return Err("a stop waits for the exchange under way and for nothing else");
+            }
+            // Repetitions to one that is off-line have their share of the line.
+            if call.is_stop && (stops == 1 || call.slave == 1) && waited > most {
+                return Err("a stop waits no longer than the printed bound");
+            }
+        }
+        let connection = self.connection;
+        self.queue.push_back(Question {
+            transaction: [*a, *b],
+            slave: *slave,
+            pdu: pdu.to_vec(),
+            connection,
+        });
+        self.next_question()
+    }
+
+    fn collect(&mut self) -> Held {
+        while let Some((id, outcome)) = self.master.poll_outcome() {
+            let Some(call) = self.calls.get_mut(&id) else {
+                return Err("an outcome of a call that nobody made");
+            };
+            if call.outcome.is_some() {
+                return Err("a call ends once");
+            }
+            if let Ok(Ok(Response::ReadHoldingRegisters(words))) = &outcome {
+                // The newest answer is the only one that can be that to a question of now.
+                if words[..] != [self.number, u16::from(call.slave)] {
+                    return Err("a value is the answer to its own question");
+                }
+            }
+            call.outcome = Some(outcome);
+        }
+        self.knows_no_more_than_there_is()
     }
 }
 

@@ -9,7 +9,7 @@ use drived_config::names::{Configured, Known, Named, Table, Told, topic_id};
 use super::{Held, Model, names};
 
 /// As it is explored.
-pub(super) const MODEL: Model = Model {
+pub(crate) const MODEL: Model = Model {
     name: "identities",
     part: "model of identities",
     against_plants: "model of identities, against planted defects",

@@ -6,7 +6,7 @@ use drive_core::{Direction, Evidence, Lease, OwnRun, RunWord, Told as Part, Verd
 use super::{Held, Model, names};
 
 /// As it is explored.
-pub(super) const MODEL: Model = Model {
+pub(crate) const MODEL: Model = Model {
     name: "lease",
     part: "model of the lease",
     against_plants: "model of the lease, against planted defects",

@@ -12,10 +12,10 @@ use drive_core::{Class, PortError, Terms, serial::SerialSettings};
 use tokio::time::Instant;
 use tokio_modbus::{Request, Response};
 
-use super::{Held, Model, names};
+use super::{Held, Model, clock::Clocked, names};
 
 /// As it is explored.
-pub(super) const MODEL: Model = Model {
+pub(crate) const MODEL: Model = Model {
     name: "master",
     part: "model of the master",
     against_plants: "model of the master, against planted defects",
@@ -337,69 +337,6 @@ impl World {
         self.run_for(Duration::ZERO)
     }
 
-    fn run_for(&mut self, time: Duration) -> Held {
-        let until = self.now + time;
-        while self.goes_on_before(until)? {}
-        self.now = self.now.max(until);
-        Ok(())
-    }
-
-    /// The next thing that the master does by itself before `until`; false: nothing.
-    fn goes_on_before(&mut self, until: Instant) -> Result<bool, &'static str> {
-        self.master.handle_timeout(self.now);
-        self.collect()?;
-        if let Some(frame) = self.master.poll_transmit(self.now) {
-            self.transmitted(&frame)?;
-            self.master.handle_sent(self.now);
-            return Ok(true);
-        }
-        let Some(due) = self.master.deadline().filter(|due| *due <= until) else { return Ok(false) };
-        if due <= self.now {
-            return Ok(false);
-        }
-        self.now = due;
-        self.master.handle_timeout(self.now);
-        self.collect()?;
-        Ok(true)
-    }
-
-    fn transmitted(&mut self, frame: &[u8]) -> Held {
-        let (slave, pdu) = (frame[0], frame[1..frame.len() - 2].to_vec());
-        if self.now < self.quiet_from + SERIAL.t3_5() {
-            return Err("3.5 characters of silence stand before each request");
-        }
-        if self.answered_at.get(&slave).is_some_and(|at| self.now < *at + PAUSE) {
-            return Err("each slave has its pause");
-        }
-        let end = self.now + SERIAL.characters(frame.len());
-        self.quiet_from = end;
-        let is_stop = pdu[..] == [6, 0, 100, 0, 0];
-        // One that was sent in vain to a slave that is off-line has its share of the line, and no more.
-        let in_vain =
-            self.calls.values().any(|call| call.terms.class == Class::Stop && !call.sent.is_empty());
-        if let Some(since) = self.stop_waits {
-            if !is_stop && since < self.now && !self.busy_at_stop && !in_vain {
-                return Err("a stop is the next thing on the wire");
-            }
-            if !is_stop && matches!(pdu[..], [6, 0, 100 | 101, ..]) {
-                return Err("no command goes before a stop that waits");
-            }
-        }
-        if is_stop {
-            if !in_vain && self.stop_waits.is_some_and(|since| self.now - since > self.bound()) {
-                return Err("a stop waits no longer than the printed bound");
-            }
-            self.stop_waits = None;
-        } else {
-            self.busy_at_stop = false;
-        }
-        let number = self.number;
-        self.number += 1;
-        let call = self.call_of(slave, &pdu, is_stop)?;
-        self.under_way = Some(UnderWay { slave, pdu, end, number, call });
-        Ok(())
-    }
-
     fn bound(&self) -> Duration {
         self.config.worst_case_stop(8, 32)
     }
@@ -458,6 +395,78 @@ impl World {
         Ok(Some(id))
     }
 
+    /// Everything has ended.
+    fn ends(&mut self) -> Held {
+        if let Some(lost) = self.under_way.take() {
+            self.lost.push(lost);
+        }
+        let until = self.now + AFTER;
+        while self.now < until {
+            if !self.goes_on_before(until)? {
+                break;
+            }
+            // Nobody answers any more.
+            self.under_way = None;
+        }
+        if self.calls.values().any(|call| call.outcome.is_none() && !call.dropped) {
+            return Err("every call ends");
+        }
+        let is_stop = |call: &&Call| call.terms.class == Class::Stop;
+        if self.stop_waits.is_some()
+            || self.calls.values().filter(is_stop).any(|call| call.sent.is_empty() && call.outcome.is_none())
+        {
+            return Err("a stop is sent, whatever becomes of its caller");
+        }
+        Ok(())
+    }
+}
+
+impl Clocked for World {
+    fn master(&mut self) -> &mut Master<u32> {
+        &mut self.master
+    }
+
+    fn now(&mut self) -> &mut Instant {
+        &mut self.now
+    }
+
+    fn transmitted(&mut self, frame: &[u8]) -> Held {
+        let (slave, pdu) = (frame[0], frame[1..frame.len() - 2].to_vec());
+        if self.now < self.quiet_from + SERIAL.t3_5() {
+            return Err("3.5 characters of silence stand before each request");
+        }
+        if self.answered_at.get(&slave).is_some_and(|at| self.now < *at + PAUSE) {
+            return Err("each slave has its pause");
+        }
+        let end = self.now + SERIAL.characters(frame.len());
+        self.quiet_from = end;
+        let is_stop = pdu[..] == [6, 0, 100, 0, 0];
+        // One that was sent in vain to a slave that is off-line has its share of the line, and no more.
+        let in_vain =
+            self.calls.values().any(|call| call.terms.class == Class::Stop && !call.sent.is_empty());
+        if let Some(since) = self.stop_waits {
+            if !is_stop && since < self.now && !self.busy_at_stop && !in_vain {
+                return Err("a stop is the next thing on the wire");
+            }
+            if !is_stop && matches!(pdu[..], [6, 0, 100 | 101, ..]) {
+                return Err("no command goes before a stop that waits");
+            }
+        }
+        if is_stop {
+            if !in_vain && self.stop_waits.is_some_and(|since| self.now - since > self.bound()) {
+                return Err("a stop waits no longer than the printed bound");
+            }
+            self.stop_waits = None;
+        } else {
+            self.busy_at_stop = false;
+        }
+        let number = self.number;
+        self.number += 1;
+        let call = self.call_of(slave, &pdu, is_stop)?;
+        self.under_way = Some(UnderWay { slave, pdu, end, number, call });
+        Ok(())
+    }
+
     fn collect(&mut self) -> Held {
         while let Some((id, outcome)) = self.master.poll_outcome() {
             // What is under way has ended with its call.
@@ -495,31 +504,6 @@ impl World {
                 _ => {}
             }
             call.outcome = Some(outcome);
-        }
-        Ok(())
-    }
-
-    /// Everything has ended.
-    fn ends(&mut self) -> Held {
-        if let Some(lost) = self.under_way.take() {
-            self.lost.push(lost);
-        }
-        let until = self.now + AFTER;
-        while self.now < until {
-            if !self.goes_on_before(until)? {
-                break;
-            }
-            // Nobody answers any more.
-            self.under_way = None;
-        }
-        if self.calls.values().any(|call| call.outcome.is_none() && !call.dropped) {
-            return Err("every call ends");
-        }
-        let is_stop = |call: &&Call| call.terms.class == Class::Stop;
-        if self.stop_waits.is_some()
-            || self.calls.values().filter(is_stop).any(|call| call.sent.is_empty() && call.outcome.is_none())
-        {
-            return Err("a stop is sent, whatever becomes of its caller");
         }
         Ok(())
     }

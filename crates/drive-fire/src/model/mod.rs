@@ -1,6 +1,7 @@
 //! Model checking: small cases explored to the end. Every sequence of so many steps of a small alphabet, from the beginning, shorter ones
 //! first: nothing is drawn, and what was not asked for within the depth was not looked at.
 
+mod clock;
 pub mod gateway;
 pub mod identities;
 pub mod lease;
