@@ -193,7 +193,7 @@ fn a_parameter_is_read_and_written_in_whichever_of_the_four_spaces_it_stands() {
     let link = link.to_str().expect("the path is text");
     let mut sim = drived(&["sim", "--pty", link, "--drive", "spaces@3", "--baud", "9600", "--format", "8E1"]);
     serves(sim.env("DRIVED_PROFILES", &folder.0), || {
-        in_four_spaces(&folder, &format!("{link},9600,8E1"), None)
+        in_four_spaces(&folder, &format!("{link},9600,8E1"), None);
     });
     if let Some(python) = python_with("pymodbus") {
         let port = free_port().to_string();
