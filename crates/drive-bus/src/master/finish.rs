@@ -232,7 +232,7 @@ impl<C> Master<C> {
                 station.stats.outcomes.damaged += 1;
                 // It may come once more, whole.
                 let again = if self.far_end_paces { config::DOUBLE } else { self.config.late_window };
-                station.doubt.owe(now, flight.shape, now + again, false);
+                station.doubt.owe(now, flight.shape, flight.wrote, now + again, false);
                 return;
             }
             // It answers, and its next exchange will prove something.
@@ -292,7 +292,7 @@ impl<C> Master<C> {
         let lost = !matches!(self.port, PortState::Open);
         let from = if flight.stalled { now } else { sent };
         let doubt = &mut self.station(flight.slave).doubt;
-        doubt.owe(now, flight.shape, from + window, lost);
+        doubt.owe(now, flight.shape, flight.wrote, from + window, lost);
         if flight.stalled {
             doubt.hold(now, from + window);
         }
