@@ -506,6 +506,52 @@ fn on_an_idle_line_an_off_line_slave_is_probed_without_back_off() {
     }
 }
 
+/// Of a slave that is off-line and answers two words where one is asked for, or damaged, as of one that is mute: 0.5 s, then twice as long
+/// each time, up to 10 s.
+#[test]
+fn an_off_line_slave_whose_answers_are_none_is_probed_with_back_off_while_others_are_asked() {
+    let probes = |answer: &dyn Fn(&mut ByHand, &[u8])| {
+        let mut line = ByHand::new(LineConfig { offline_after: 1, ..once() });
+        line.ask(1, 1, READ, Terms::default());
+        line.sent();
+        while line.ended().is_none() {
+            line.now += 50 * MS;
+            line.master.handle_timeout(line.now);
+        }
+        let (end, mut probes) = (line.now + 60_000 * MS, 0);
+        line.ask(2, 2, READ, Terms::default());
+        while line.now < end {
+            let request = line.sent();
+            if request[0] == 1 {
+                probes += 1;
+                answer(&mut line, &request);
+            } else {
+                line.answers(&request, &words(&vec![1; asked(&request).into()]));
+            }
+            if line.ended().is_some() {
+                line.ask(2, 2, READ, Terms::default());
+            }
+        }
+        probes
+    };
+    let mute = probes(&|_, _| ());
+    let of_another_length = probes(&|line, request| {
+        let more = usize::from(asked(request)) + 1;
+        line.answers(request, &words(&vec![1; more]));
+    });
+    let damaged = probes(&|line, request| {
+        let mut answer = rtu::frame(request[0], &words(&vec![1; asked(request).into()])).to_vec();
+        answer[4] ^= 0x10;
+        line.hears(SERIAL.characters(request.len() + answer.len()) + RESPONSE, &answer);
+    });
+    assert!((8..=12).contains(&mute), "{mute}");
+    assert_eq!(
+        [of_another_length, damaged].map(|probes| probes <= mute),
+        [true; 2],
+        "{of_another_length}, {damaged}"
+    );
+}
+
 #[test]
 fn a_modbus_tcp_answer_that_lay_in_the_socket_before_its_request_was_sent_is_none() {
     let mut script = Script::new(Mbap::new());

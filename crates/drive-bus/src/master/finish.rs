@@ -226,6 +226,10 @@ impl<C> Master<C> {
         if may_be_anothers {
             self.fear_late_answer(now, flight);
         }
+        // What is off-line and says what is no answer is probed no sooner for that.
+        if matches!(failure, Failure::Damaged(_) | Failure::Mismatch(_)) {
+            self.offline.missed_again(now, flight.slave, self.config.probe_backoff);
+        }
         let Some(station) = self.stations.get_mut(&flight.slave) else { return };
         match failure {
             Failure::Damaged(_) => {
