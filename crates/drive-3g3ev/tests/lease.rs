@@ -12,7 +12,7 @@ use drive_testing::{
     bench,
     words::{Asked, Words},
 };
-use rig::{Judged, Rig, one, ready, running};
+use rig::{Judged, Rig, one, ready, running, with};
 use tokio::time::{Duration, sleep};
 
 const FIFTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(50));
@@ -74,6 +74,20 @@ async fn a_run_command_is_ours_from_before_it_is_written_until_a_stop_is_seen() 
     until(&mut drive, &machine, 0).await;
     let status = drive.status().await.unwrap();
     assert_eq!((status.motion, status.is_standstill(), status.verdict), (Motion::AtRest, true, None));
+}
+
+/// Exception 05h says that the drive works on it. Here it never takes the word, and its motor comes down for another reason: 002Ch of a
+/// drive that the bus commands, 0020h that runs (p. 42), no output.
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_is_acknowledged_and_never_taken_is_repeated_and_not_confirmed() {
+    let mut words = with(&[(0x0001, 1), (0x0020, 0x0085), (0x002C, 0x0061)]);
+    words.refuses_writes = Some(5);
+    let mut drive = rig::drive(words);
+    drive.adopt(Lease::new(Direction::Forward, 1));
+    drive.stop(StopMode::Ramp).await.expect_err("0001h holds the run command");
+    assert!(drive.lease().is_some());
+    let stops = drive.into_port().written().into_iter().filter(|(at, word)| *at == 1 && word & 1 == 0);
+    assert!(stops.count() > 1);
 }
 
 #[tokio::test(start_paused = true)]

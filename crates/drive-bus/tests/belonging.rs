@@ -305,6 +305,44 @@ fn a_late_confirmation_proves_a_write_that_is_repeated_and_none_that_followed_an
     }
 }
 
+/// The confirmation of function 10h repeats where and how much was written, and not what (Modbus Application Protocol V1.1b3, 6.12).
+#[test]
+fn a_confirmation_that_names_no_value_proves_none_while_that_of_another_value_is_owed() {
+    let unknown = || Err(PortError::OutcomeUnknown("the answer may be that to an earlier request"));
+    let write = |value: u16| Request::WriteMultipleRegisters(1, vec![value].into());
+    for (value, class, wait, is_read, is_told) in [
+        (0, Class::Command, 2_000, false, false),
+        // A stop waits for no late window.
+        (0, Class::Stop, 0, false, false),
+        // The same once more: whichever of the two was answered, the value is there.
+        (64, Class::Command, 2_000, false, true),
+        // Behind the late window the slave has answered something else: what it was asked before is over.
+        (0, Class::Command, 2_000, true, true),
+    ] {
+        let mut line = ByHand::new(once());
+        line.ask(1, 1, write(64), Terms::of(Class::Command));
+        line.sent();
+        nothing_is_sent_for(&mut line, 600 * MS);
+        assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
+        nothing_is_sent_for(&mut line, wait * MS);
+        if is_read {
+            line.ask(2, 1, READ, Terms::default());
+            let request = line.sent();
+            line.answers(&request, &words(&vec![1; asked(&request).into()]));
+            assert!(matches!(line.ended(), Some((2, Ok(_)))));
+        }
+        line.ask(3, 1, write(value), Terms::of(class));
+        let request = line.sent();
+        line.answers(&request, &request[1..6]);
+        let done = Ok(Ok(Response::WriteMultipleRegisters(1, 1)));
+        assert_eq!(
+            line.ended(),
+            Some((3, if is_told { done } else { unknown() })),
+            "{value} {class:?} {is_read}"
+        );
+    }
+}
+
 #[test]
 fn an_answer_that_came_while_the_host_was_away_from_its_own_writing_proves_nothing() {
     let mut line = ByHand::new(once());
@@ -466,6 +504,52 @@ fn on_an_idle_line_an_off_line_slave_is_probed_without_back_off() {
         assert!(line.now - last <= 3_000 * MS, "{:?}", line.now - last);
         last = line.now;
     }
+}
+
+/// Of a slave that is off-line and answers two words where one is asked for, or damaged, as of one that is mute: 0.5 s, then twice as long
+/// each time, up to 10 s.
+#[test]
+fn an_off_line_slave_whose_answers_are_none_is_probed_with_back_off_while_others_are_asked() {
+    let probes = |answer: &dyn Fn(&mut ByHand, &[u8])| {
+        let mut line = ByHand::new(LineConfig { offline_after: 1, ..once() });
+        line.ask(1, 1, READ, Terms::default());
+        line.sent();
+        while line.ended().is_none() {
+            line.now += 50 * MS;
+            line.master.handle_timeout(line.now);
+        }
+        let (end, mut probes) = (line.now + 60_000 * MS, 0);
+        line.ask(2, 2, READ, Terms::default());
+        while line.now < end {
+            let request = line.sent();
+            if request[0] == 1 {
+                probes += 1;
+                answer(&mut line, &request);
+            } else {
+                line.answers(&request, &words(&vec![1; asked(&request).into()]));
+            }
+            if line.ended().is_some() {
+                line.ask(2, 2, READ, Terms::default());
+            }
+        }
+        probes
+    };
+    let mute = probes(&|_, _| ());
+    let of_another_length = probes(&|line, request| {
+        let more = usize::from(asked(request)) + 1;
+        line.answers(request, &words(&vec![1; more]));
+    });
+    let damaged = probes(&|line, request| {
+        let mut answer = rtu::frame(request[0], &words(&vec![1; asked(request).into()])).to_vec();
+        answer[4] ^= 0x10;
+        line.hears(SERIAL.characters(request.len() + answer.len()) + RESPONSE, &answer);
+    });
+    assert!((8..=12).contains(&mute), "{mute}");
+    assert_eq!(
+        [of_another_length, damaged].map(|probes| probes <= mute),
+        [true; 2],
+        "{of_another_length}, {damaged}"
+    );
 }
 
 #[test]

@@ -63,6 +63,11 @@ fn no_cell_that_was_a_find_is_one_again() {
             "A:134574732",
             "a 58 that was let coast, and taken by its panel at a setpoint of zero: told at rest",
         ),
+        ("E:24453", "a 312 told in force while it came down, whose panel gave back control"),
+        ("A:97350993", "the same in a setpoint"),
+        ("W:366934", "the late confirmation by 10h of another value, told as that of the next write"),
+        ("A:154333284", "the same behind a gateway"),
+        ("A:128469787", "an equal stop, confirmed by the answer to the one before it: the matrix was wrong"),
         (
             "W:177444",
             "a start that was confirmed, and says that this was four seconds ago: the matrix was wrong",

@@ -329,6 +329,20 @@ async fn a_motor_that_a_refused_start_saw_running_and_that_has_tripped_by_the_ne
     assert_eq!(drive.status().await.unwrap().motion, Motion::Coasting);
 }
 
+/// Exception 05h says that the drive works on it. Here it never takes the word, and its motor comes down for another reason.
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_is_acknowledged_and_never_taken_is_repeated_and_not_confirmed() {
+    let mut words = Words::new(&CAPABILITIES, &[&RUNNING[..], &[(0xFD00, 0)]].concat());
+    words.refuses_writes = Some(5);
+    let mut drive = Atv21::new(words, bench::address(1));
+    drive.adopt(Lease::new(Direction::Forward, 0xC400));
+    drive.stop(StopMode::Ramp).await.expect_err("FA00 holds the run command");
+    assert!(drive.lease().is_some());
+    let stops =
+        drive.into_port().written().into_iter().filter(|(at, word)| *at == 0xFA00 && word & 0x0400 == 0);
+    assert!(stops.count() > 1);
+}
+
 #[tokio::test(start_paused = true)]
 async fn what_an_always_active_function_would_start_no_reset_release_or_parameter_does() {
     // F110 = 2 runs it forward as soon as the terminals command.

@@ -69,6 +69,9 @@ struct Known {
     stray: bool,
     /// Such an answer is owed and has not come.
     owed: bool,
+    /// A check over the write that it confirms, of which the confirmation of some writes repeats no value. `None`: it confirms none,
+    /// or its slave has answered something behind its time, so that it hardly comes any more.
+    wrote: Option<u16>,
     /// Something else was written since.
     overtaken: bool,
     /// Its port was lost. What comes over the next one may be anything that the last one left behind, also an echo, so
@@ -78,7 +81,14 @@ struct Known {
 
 impl Doubt {
     /// An answer of this shape may still come until `until`, and hardly after it.
-    pub(super) fn owe(&mut self, now: Instant, shape: Shape, until: Instant, over_a_lost_port: bool) {
+    pub(super) fn owe(
+        &mut self,
+        now: Instant,
+        shape: Shape,
+        wrote: Option<u16>,
+        until: Instant,
+        over_a_lost_port: bool,
+    ) {
         self.strange_until = Some(now + MEMORY);
         let avoid = until.max(now + MEMORY);
         self.remember(Known {
@@ -88,6 +98,7 @@ impl Doubt {
             will_come: true,
             stray: false,
             owed: true,
+            wrote,
             overtaken: false,
             over_a_lost_port,
         });
@@ -164,6 +175,9 @@ impl Doubt {
         }
         self.known
             .retain(|known| known.avoid > now && (known.shape != shape || known.will_come || known.stray));
+        for known in self.known.iter_mut().filter(|known| known.wait <= now) {
+            known.wrote = None;
+        }
         let strange = self.is_strange(now);
         // An answer that is late is late once, and then no reason any more to wait.
         let owes = self.known.iter().any(|known| known.owed);
@@ -205,16 +219,20 @@ impl Doubt {
     }
 
     /// Whether the confirmation of a write with this shape may be that of an earlier one and prove nothing: something else was
-    /// written between the two, or nobody knows what came meanwhile.
-    pub(super) fn owes(&self, now: Instant, shape: Shape) -> bool {
+    /// written between the two, or nobody knows what came meanwhile. `wrote` is a check over the write. That of function 10h names
+    /// no value: the confirmation of another one that is owed is none of this one, however late it comes.
+    pub(super) fn owes(&self, now: Instant, shape: Shape, wrote: Option<u16>) -> bool {
         let held = self.held_until.is_some_and(|until| until > now);
-        self.owed(now).any(|known| known.shape == shape && (known.overtaken || held))
+        let another =
+            |known: &Known| wrote.is_some() && known.wrote.is_some_and(|other| Some(other) != wrote);
+        let owed = self.known.iter().filter(|known| known.owed && known.shape == shape);
+        { owed }.any(|known| known.wait > now && (known.overtaken || held) || another(known))
     }
 
-    /// Something is written, whose confirmation has this shape.
-    pub(super) fn written(&mut self, shape: Shape) {
+    /// Something is written, whose confirmation has this shape, with the check over it.
+    pub(super) fn written(&mut self, shape: Shape, wrote: u16) {
         for known in &mut self.known {
-            known.overtaken |= known.shape != shape;
+            known.overtaken |= known.shape != shape || known.wrote.is_some_and(|other| other != wrote);
         }
     }
 
@@ -258,6 +276,7 @@ impl Known {
             will_come: false,
             stray: false,
             owed: false,
+            wrote: None,
             overtaken: false,
             over_a_lost_port: false,
         }

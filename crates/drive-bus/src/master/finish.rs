@@ -226,13 +226,17 @@ impl<C> Master<C> {
         if may_be_anothers {
             self.fear_late_answer(now, flight);
         }
+        // What is off-line and says what is no answer is probed no sooner for that.
+        if matches!(failure, Failure::Damaged(_) | Failure::Mismatch(_)) {
+            self.offline.missed_again(now, flight.slave, self.config.probe_backoff);
+        }
         let Some(station) = self.stations.get_mut(&flight.slave) else { return };
         match failure {
             Failure::Damaged(_) => {
                 station.stats.outcomes.damaged += 1;
                 // It may come once more, whole.
                 let again = if self.far_end_paces { config::DOUBLE } else { self.config.late_window };
-                station.doubt.owe(now, flight.shape, now + again, false);
+                station.doubt.owe(now, flight.shape, flight.wrote, now + again, false);
                 return;
             }
             // It answers, and its next exchange will prove something.
@@ -292,7 +296,7 @@ impl<C> Master<C> {
         let lost = !matches!(self.port, PortState::Open);
         let from = if flight.stalled { now } else { sent };
         let doubt = &mut self.station(flight.slave).doubt;
-        doubt.owe(now, flight.shape, from + window, lost);
+        doubt.owe(now, flight.shape, flight.wrote, from + window, lost);
         if flight.stalled {
             doubt.hold(now, from + window);
         }

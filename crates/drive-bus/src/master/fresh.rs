@@ -121,7 +121,7 @@ impl<C> Master<C> {
         self.fresh.opened = Some(Opened { since: now, listen: LISTEN, asked: false });
         let until = now + self.config.late_window;
         for (slave, shape) in std::mem::take(&mut self.fresh.last) {
-            self.station(slave).doubt.owe(now, shape, until, true);
+            self.station(slave).doubt.owe(now, shape, None, until, true);
         }
     }
 

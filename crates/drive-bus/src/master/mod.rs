@@ -135,6 +135,8 @@ struct Flight<C> {
     slave: u8,
     request: Arc<Request<'static>>,
     shape: Shape,
+    /// A check over it, where it writes.
+    wrote: Option<u16>,
     /// Somebody's stop, whether he still waits for it or not.
     is_stop: bool,
     /// By how many words the read was lengthened.

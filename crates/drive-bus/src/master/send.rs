@@ -17,6 +17,7 @@ use super::{
 use crate::{
     answer,
     evidence::Over,
+    exchange::Frame,
     pdu,
     schedule::{Chosen, Entry, Readiness},
     shape,
@@ -225,10 +226,11 @@ impl<C> Master<C> {
         };
         let is_write = self.exchange.is_write(&request);
         let first = crate::mutant!("first-answer-believed", self.fresh.is_first(), false);
+        let wrote = is_write.then(|| Frame::of(pdu).check);
         let doubt = &mut self.station(slave).doubt;
-        let suspect = first || doubt.owes(now, shape);
-        if is_write {
-            doubt.written(shape);
+        let suspect = first || doubt.owes(now, shape, wrote);
+        if let Some(wrote) = wrote {
+            doubt.written(shape, wrote);
         }
         let answer = answer::likely_len(&request);
         self.longest = (self.longest.0.max(pdu.len()), self.longest.1.max(answer));
@@ -240,6 +242,7 @@ impl<C> Master<C> {
             slave,
             request,
             shape,
+            wrote,
             more,
             suspect,
             stalled: false,

@@ -8,7 +8,7 @@ use std::{
 
 use async_trait::async_trait;
 use drive_core::{Class, Effect, Motion, Port, PortError, SlaveAddress, Status, Terms};
-use drive_sim::SimSlave;
+use drive_sim::{Received, SimSlave};
 use drive_testing::truth::contradiction;
 use tokio::time::Instant;
 use tokio_modbus::{Request, Response, Slave, client::Client, slave::SlaveContext};
@@ -180,7 +180,12 @@ impl Judged {
                 let why = format!("a value that the machine did not give: {words:04X?}");
                 self.object(Kind::Value, &why, pdu);
             }
-            Ok(Ok(_)) if writes && self.bench.way != Way::UniTelway && self.taken(pdu, asked).is_empty() => {
+            Ok(Ok(_))
+                if writes
+                    && self.bench.way != Way::UniTelway
+                    && self.taken(pdu, asked).is_empty()
+                    && !self.is_held(pdu) =>
+            {
                 self.object(Kind::Confirmation, "confirmed, and never taken by the machine", pdu);
             }
             Err(error) if writes && self.bench.way != Way::UniTelway => {
@@ -205,6 +210,20 @@ impl Judged {
                     .breach(format!("a command was sent {:?} after it was given ({pdu:02X?})", at - asked));
             }
         }
+    }
+
+    /// Whether this is a level that the machine took before, as the last of what was written there, and holds: that an equal write is
+    /// confirmed by the answer to the one before it says what is so.
+    fn is_held(&self, pdu: &[u8]) -> bool {
+        let (Some(place), [.., high, low]) = (pdu.get(1..3), pdu) else { return false };
+        let is_there =
+            |got: &Received| matches!(got.pdu.first(), Some(6 | 16)) && got.pdu.get(1..3) == Some(place);
+        let received = self.bench.machine.received();
+        let last = received.iter().rev().find(|got| is_there(got));
+        let address = u16::from_be_bytes([place[0], place[1]]);
+        self.terms.effect == Effect::Level
+            && last.is_some_and(|got| got.pdu[..] == *pdu)
+            && self.bench.machine.peek(address) == Some(u16::from_be_bytes([*high, *low]))
     }
 
     /// Whether these words are what the machine has answered to this question since it was asked.
