@@ -206,7 +206,7 @@ impl Port for Box<dyn Port> {
 pub enum PortError {
     /// Sent, and no answer came in time. A read: nothing is known. A write reports
     /// [`OutcomeUnknown`](Self::OutcomeUnknown) instead.
-    #[error("no answer within {after:?}")]
+    #[error("no answer within {}", shown(*after))]
     Timeout {
         /// How long the line waited after the last bit of the request.
         after: Duration,
@@ -263,7 +263,15 @@ fn next_probe(retry_in: Duration) -> String {
     if retry_in.is_zero() {
         "it is probed as soon as the line is free".to_owned()
     } else {
-        format!("next probe in {retry_in:.1?}")
+        format!("next probe in {}", shown(retry_in))
+    }
+}
+
+/// A time that was learned or measured, for a person: in milliseconds, from a second on in tenths of one.
+fn shown(time: Duration) -> String {
+    match (time.as_micros() + 500) / 1_000 {
+        milliseconds @ ..1_000 => format!("{milliseconds} ms"),
+        _ => format!("{:.1} s", time.as_secs_f64()),
     }
 }
 
@@ -336,6 +344,15 @@ mod tests {
         classes.sort();
         assert_eq!(classes.last(), Some(&Class::Stop));
         assert!(Class::ALL.windows(2).all(|pair| pair[0] > pair[1]));
+    }
+
+    #[test]
+    fn a_learned_time_is_told_without_its_nanoseconds() {
+        let told = |nanoseconds| PortError::Timeout { after: Duration::from_nanos(nanoseconds) }.to_string();
+        assert_eq!(told(160_196_386), "no answer within 160 ms");
+        assert_eq!(told(999_700_000), "no answer within 1.0 s");
+        let offline = PortError::Offline { retry_in: Duration::from_nanos(944_512_345) };
+        assert_eq!(offline.to_string(), "the slave is off-line, next probe in 945 ms");
     }
 
     #[test]

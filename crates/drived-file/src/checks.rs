@@ -9,6 +9,7 @@ use std::{
 };
 
 use drive_bus::Endpoint;
+use drive_families::Family;
 
 use serde::Deserialize as _;
 use toml::de::{DeTable, Deserializer};
@@ -59,12 +60,27 @@ pub(super) fn added(
     Ok(Some(Added { file, is_aside, text }))
 }
 
+/// What cannot be read, with the place; an option of a family that stands where every drive's settings do is told where it
+/// belongs.
+pub(super) fn refused(source: Source<'_>, error: &toml::de::Error) -> ConfigError {
+    let unknown = error.message().strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
+    let option = unknown.filter(|name| Family::all().iter().any(|family| family.has_option(name)));
+    let problem = match option {
+        Some(name) => format!(
+            "it is an option of the drive's family: expected options = {{ {name} = … }}; limits of setpoints for a drive of any \
+             family are frequency = {{ low = …, high = … }}"
+        ),
+        None => error.message().to_owned(),
+    };
+    match error.span() {
+        Some(span) => source.error(span, problem),
+        None => source.error_of_file(problem),
+    }
+}
+
 /// A file that has lines and drives, and nothing else.
 pub(super) fn only_plant(source: Source<'_>) -> Result<file::File, ConfigError> {
-    let wrong = |error: toml::de::Error| match error.span() {
-        Some(span) => source.error(span, error.message()),
-        None => source.error_of_file(error.message()),
-    };
+    let wrong = |error| refused(source, &error);
     let tables = DeTable::parse(source.text).map_err(wrong)?;
     let other = tables.get_ref().keys().find(|key| !["lines", "drives"].contains(&&**key.get_ref()));
     if let Some(other) = other {

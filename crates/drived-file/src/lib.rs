@@ -129,10 +129,7 @@ impl Config {
     /// `instead` is read in the place of the file of what is added at the page.
     fn parse(file: &Path, text: &str, instead: Option<&str>) -> Result<Self, ConfigError> {
         let source = Source { file, text };
-        let wrong = |error: toml::de::Error| match error.span() {
-            Some(span) => source.error(span, error.message()),
-            None => source.error_of_file(error.message()),
-        };
+        let wrong = |error| checks::refused(source, &error);
         let mut tables = DeTable::parse(text).map_err(wrong)?;
         // What is a face's is read by it, when the rest is known; what is left is the daemon's own, and has to be known.
         let mut written = Vec::new();

@@ -183,6 +183,11 @@ fn what_is_wrong_is_told_with_file_line_field_and_what_was_expected() {
             "drives.toml:6: running: \"fast\": expected a whole number and a unit",
         ),
         ("running = \"1s\"", "runing = \"1s\"", "drives.toml:6: runing: unknown field `runing`, expected"),
+        (
+            "running = \"1s\"",
+            "fault-reset-function = 5",
+            "drives.toml:6: fault-reset-function: it is an option of the drive's family: expected options = {",
+        ),
         ("time = \"5s\"", "time = \"5\"", "drives.toml:9: time: \"5\": expected a whole number and a unit"),
         (
             "reaction = \"ramp\" }",

@@ -133,7 +133,7 @@ mod tests {
         };
         assert_eq!(
             of(Err(error)),
-            r#"{"kind":"error","time_unix_ms":5,"drive":"atv312@7","error":"slave 7, reading register 3201 (0C81h): no answer within 500ms"}"#
+            r#"{"kind":"error","time_unix_ms":5,"drive":"atv312@7","error":"slave 7, reading register 3201 (0C81h): no answer within 500 ms"}"#
         );
     }
 }

@@ -84,3 +84,8 @@ export function zoneAt(date = new Date()) {
 
 /** Texts in the order in which a person sorts them: "pump 2" before "pump 10". */
 export const byName = new Intl.Collator(undefined, { numeric: true }).compare;
+
+/** How much of a line is used; of one whose port is away nothing is, whatever was asked in vain. */
+export function load(line) {
+  return quantity(line.link === 'away' ? undefined : line.utilisation_percent, 0, '%');
+}

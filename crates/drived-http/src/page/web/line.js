@@ -2,7 +2,7 @@
 
 import { address, path } from './api.js';
 import { el, setText, table } from './dom.js';
-import { duration, MISSING, quantity } from './format.js';
+import { duration, load, MISSING, quantity } from './format.js';
 import { lastExchanges } from './line_last.js';
 import { plant } from './plant.js';
 import { named, t } from './texts.js';
@@ -26,7 +26,7 @@ export function lines(root) {
     body.replaceChildren(...[...plant.lines.values()].map(line => el(line.link === 'away' ? 'tr.in-trouble' : 'tr', {},
       el('th', { scope: 'row' }, el('a', { href: `#/line/${encodeURIComponent(line.name)}` }, line.name)),
       el('td', {}, [line.port, line.protocol, line.link === 'away' && (told(line.error) || t('line_away'))].filter(Boolean).join(' · ')),
-      el('td.right', {}, quantity(line.utilisation_percent, 0, '%')),
+      el('td.right', {}, load(line)),
       el('td.right', {}, duration(line.cycle_ms)),
       el('td.right', {}, duration(line.worst_case_stop_ms)),
       el('td.right', {}, quantity(line.exchanges, 0)),
@@ -64,7 +64,7 @@ export function line(root, name) {
     if (!now) return;
     setText(place, [now.port, now.protocol, now.link === 'away' && (told(now.error) || t('line_away'))].filter(Boolean).join(' · '));
     place.classList.toggle('bad', now.link === 'away');
-    const values = [quantity(now.utilisation_percent, 0, '%'), duration(now.worst_case_stop_ms), duration(now.cycle_ms),
+    const values = [load(now), duration(now.worst_case_stop_ms), duration(now.cycle_ms),
       quantity(now.exchanges, 0), quantity(sum(now.errors), 0)];
     values.forEach((value, index) => setText(big[index].lastChild, value));
     big[0].title = named(t('since_opening'), quantity(now.utilisation_since_opening_percent, 0, '%'));

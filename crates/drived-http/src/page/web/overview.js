@@ -4,7 +4,7 @@ import { path } from './api.js';
 import { confirmed } from './ask.js';
 import { arrange, el, setAttribute, setClass, setText } from './dom.js';
 import { folds, makeFold } from './fold.js';
-import { quantity } from './format.js';
+import { load } from './format.js';
 import { command } from './orders.js';
 import { here, keepAsked } from './place.js';
 import { mayCommand, plant, quality } from './plant.js';
@@ -253,15 +253,16 @@ export function overview(root, _, isBack) {
 /** A line in the strip: a link with its name, its utilisation and how many of its drives answer. */
 function makeLine(name) {
   const title = el('b', {}, name);
-  const load = el('span.number');
+  const used = el('span.number');
   const drives = el('span.counted');
   const meter = el('span.meter', { 'aria-hidden': 'true' }, el('i.fill'));
-  const element = el('a.tile', { href: `#/line/${encodeURIComponent(name)}` }, title, load, meter, drives);
+  const element = el('a.tile', { href: `#/line/${encodeURIComponent(name)}` }, title, used, meter, drives);
   const update = line => {
     const members = [...plant.drives.values()].filter(drive => drive.line === name);
     const connected = members.filter(drive => drive.link === 'connected').length;
-    setText(load, quantity(line.utilisation_percent, 0, '%'));
-    meter.firstChild.style.transform = `scaleX(${Math.min((line.utilisation_percent ?? 0) / 100, 1).toFixed(3)})`;
+    setText(used, load(line));
+    const share = line.link === 'away' ? 0 : (line.utilisation_percent ?? 0) / 100;
+    meter.firstChild.style.transform = `scaleX(${Math.min(share, 1).toFixed(3)})`;
     setText(drives, line.link === 'away' ? t('line_away') : t('line_health', { connected, count: members.length }));
     setClass(element, 'in-trouble', line.link === 'away' || connected < members.length);
   };

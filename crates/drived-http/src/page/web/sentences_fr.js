@@ -316,6 +316,7 @@ const PATTERNS = [
   [/^it is an? (.+): (.+)$/, (what, family) => `c’est un ${what} : ${family}`],
   [/^(\d+) times today$/, times => `${times} fois aujourd’hui`],
   [/^next probe in (.+)$/, time => `prochain essai dans ${number(time)}`],
+  [/^it was called (.+)$/, name => `il s’appelait ${name}`],
   [/^by (bus|terminals|panel|local|other bus)$/, who => ({ bus: 'par le bus', terminals: 'par le bornier', panel: 'par le terminal', local: 'en local', 'other bus': 'par un autre bus' })[who]],
   [/^(present|gone)$/, how => (how === 'present' ? 'présente' : 'disparue')],
   [/^this needs a token with the right to (.+)$/, right => `il faut un jeton avec le droit « ${right} »`],

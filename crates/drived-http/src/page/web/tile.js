@@ -25,7 +25,10 @@ export function makeTile(drive) {
     setAttribute(element, 'data-trouble', severe ? 'severe' : isTrouble(worst) && 'minor');
     setAttribute(element, 'data-quality', known);
     setText(frequency, frequencyText(drive.status));
-    setText(state.lastChild, stateWord(drive));
-    setText(note, drive.fault?.mnemonic || worst.alike || (known === 'stale' ? old(age(drive.status, drive)) : ''));
+    const shows = stateWord(drive);
+    setText(state.lastChild, shows);
+    const remark = drive.fault?.mnemonic || worst.alike || (known === 'stale' ? old(age(drive.status, drive)) : '');
+    // What its state says already is not said again.
+    setText(note, remark.toLowerCase() === shows.toLowerCase() ? '' : remark);
   }
 }

@@ -12,6 +12,9 @@ use drived_plant::plant::{
     views::{HappenedView, SettingsView},
 };
 
+/// What `control` means: beside the state it is who commands the drive.
+const MAY_COMMAND: &str = "may be commanded";
+
 /// The newest alarms stand in a report, and how many there are besides.
 const ALARMS: usize = 60;
 
@@ -40,7 +43,8 @@ fn rows(told: &SettingsView) -> Vec<(String, Markup)> {
     let mut rows = Vec::new();
     let settings = json!(told.settings);
     for (key, value) in settings.as_object().into_iter().flatten().filter(|(key, _)| *key != "name") {
-        flatten(&spoken(key), value, &mut rows);
+        let label = if key == "control" { MAY_COMMAND.to_owned() } else { spoken(key) };
+        flatten(&label, value, &mut rows);
     }
     for (age, label) in [
         (told.running_age_ms, "by the plan, a status is never older, running"),

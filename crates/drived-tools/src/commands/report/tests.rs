@@ -239,7 +239,7 @@ async fn the_words_of_a_report_are_french_and_none_is_missing() {
     for text in [
         "lang=\"fr\"",
         "Les variateurs en un coup d’œil",
-        "Déclenché : ",
+        "Déclenché\u{a0}: ",
         "technicien",
         "Mill &amp; Sons",
         "lieu et date",

@@ -73,15 +73,15 @@ pub(super) fn span(milliseconds: impl Into<Option<u64>>) -> String {
 pub(super) fn share(part: u64, whole: u64) -> String {
     match whole {
         0 => "–".to_owned(),
-        _ if part > 0 && part * 10_000 < whole => "< 0.01 %".to_owned(),
-        _ if part < whole && (whole - part) * 10_000 < whole => "> 99.99 %".to_owned(),
-        _ => format!("{:.2} %", part as f64 * 100.0 / whole as f64),
+        _ if part > 0 && part * 10_000 < whole => "< 0.01\u{a0}%".to_owned(),
+        _ if part < whole && (whole - part) * 10_000 < whole => "> 99.99\u{a0}%".to_owned(),
+        _ => format!("{:.2}\u{a0}%", part as f64 * 100.0 / whole as f64),
     }
 }
 
 /// A share that is told in per cent.
 pub(super) fn percent(share: f64) -> String {
-    format!("{share:.2} %")
+    format!("{share:.2}\u{a0}%")
 }
 
 /// A moment by this computer's clock.

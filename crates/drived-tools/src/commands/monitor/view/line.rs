@@ -58,7 +58,11 @@ fn summary(document: &mut Document, line: &LineView) {
     }
     document.pair("port", Some(format!("{}, {}", escaped(&line.port), escaped(&line.protocol))));
     let (now, all) = (line.utilisation_percent, line.utilisation_since_opening_percent);
-    document.pair("utilisation", Some(format!("{now:.0} % lately, {all:.0} % since it was opened")));
+    let used = match line.link {
+        LineLink::Away => "none: its port is away".to_owned(),
+        LineLink::Connected => format!("{now:.0} % lately, {all:.0} % since it was opened"),
+    };
+    document.pair("utilisation", Some(used));
     let stop = time(line.worst_case_stop_ms);
     document.pair("a stop waits", Some(format!("{stop} at most, whatever happens")));
     let cycle = time(line.cycle_ms);

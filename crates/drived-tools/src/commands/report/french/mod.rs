@@ -20,12 +20,17 @@ pub(super) fn translated(html: &str) -> String {
             Part::Ours(said) => {
                 let plain = unescaped(said);
                 match french(&plain) {
-                    Some(french) => text.push_str(&escaped(&french)),
+                    Some(french) => text.push_str(&escaped(&spaced(&french))),
                     None => text.push_str(said),
                 }
             }
             Part::Others(said) => match unescaped(said) {
                 plain if is_number(&plain) => text.push_str(&escaped(&number(&plain))),
+                // What stands between two of our texts.
+                _ if said.starts_with(": ") || said.starts_with("; ") => {
+                    text.push(NO_BREAK);
+                    text.push_str(said);
+                }
                 _ => text.push_str(said),
             },
         }
@@ -132,6 +137,16 @@ fn put(held: &[String], french: &str) -> String {
         .fold(french.to_owned(), |text, (index, value)| text.replace(&format!("{{{index}}}"), value))
 }
 
+/// A space at which no line ends.
+const NO_BREAK: char = '\u{a0}';
+
+/// No line begins with a sign that has a space before it.
+fn spaced(french: &str) -> String {
+    [':', ';', '»'].into_iter().fold(french.replace("« ", "«\u{a0}"), |text, sign| {
+        text.replace(&format!(" {sign}"), &format!("{NO_BREAK}{sign}"))
+    })
+}
+
 /// A word as it stands inside a sentence.
 fn inside(word: &str) -> String {
     let mut letters = word.chars();
@@ -142,16 +157,16 @@ fn inside(word: &str) -> String {
 }
 
 /// The units behind a number; without one it may be a version.
-const UNITS: [&str; 15] =
-    ["ms", "s", "min", "h", "d", "Hz", "A", "V", "%", "rpm", "kW", "kWh", "Wh", "W", "Nm"];
+const UNITS: [&str; 16] =
+    ["ms", "s", "min", "h", "d", "Hz", "A", "V", "%", "rpm", "tr/min", "kW", "kWh", "Wh", "W", "Nm"];
 
 /// Whether a text is a number with its unit, and nothing else.
 fn is_number(text: &str) -> bool {
-    let text = text.trim_start_matches(['<', '>', ' ', '-', '−']);
-    text.split_once(' ').is_some_and(|(number, unit)| {
+    let text = text.trim_start_matches(['<', '>', ' ', NO_BREAK, '-', '−']);
+    text.split_once([' ', NO_BREAK]).is_some_and(|(number, unit)| {
         UNITS.contains(&unit)
             && number.starts_with(|one: char| one.is_ascii_digit())
-            && number.chars().all(|one| one.is_ascii_digit() || one == '.')
+            && number.chars().all(|one| one.is_ascii_digit() || ['.', ','].contains(&one))
     })
 }
 
@@ -164,10 +179,8 @@ fn number(text: &str) -> String {
         one => one,
     };
     let text: String = text.char_indices().map(comma).collect();
-    match text.strip_suffix(" rpm") {
-        Some(number) => format!("{number} tr/min"),
-        None => text,
-    }
+    let text = text.replace(" rpm", " tr/min");
+    if is_number(&text) { text.replace(' ', "\u{a0}") } else { text }
 }
 
 const ESCAPES: [(&str, &str); 4] = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&amp;", "&")];

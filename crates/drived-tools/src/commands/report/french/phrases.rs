@@ -31,7 +31,7 @@ pub(super) const PHRASES: &[(&str, &str)] = &[
     ("{} times today", "{0} fois aujourd’hui"),
     ("{} times", "{0} fois"),
     ("code {}, whose meaning is not known here", "code {0}, dont la signification n’est pas connue ici"),
-    ("the manual has a rule: {s}", "le manuel a une règle : {0}"),
+    ("the manual has a rule: {s}", "règle : {0}"),
     ("{s}, with {r} = {r}: {s}, with {r} = {r}: {s}", "{0}, avec {1} = {2} : {3}, avec {4} = {5} : {6}"),
     ("{s}, with {r} = {r}: {s}", "{0}, avec {1} = {2} : {3}"),
     ("{s}, on {r}: {s}", "{0}, sur {1} : {2}"),

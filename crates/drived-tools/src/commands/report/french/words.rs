@@ -80,6 +80,7 @@ pub(super) const WORDS: &[(&str, &str)] = &[
     ("alarms: current", "alarmes : courant"),
     ("alarms: drive thermal", "alarmes : état thermique du variateur"),
     ("alarms: motor thermal", "alarmes : état thermique du moteur"),
+    ("may be commanded", "peut être commandé"),
     ("coast", "temps en roue libre"),
     ("commanders", "qui peut commander"),
     ("commanders: only", "qui peut commander : seulement"),
