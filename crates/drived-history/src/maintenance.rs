@@ -105,7 +105,7 @@ fn tell(plant: &Plant, counts: &[Count]) {
         let mut own = counts.iter().filter(|count| *count.maintained.drive == **drive.name()).peekable();
         if own.peek().is_some() {
             let due: Vec<(String, String)> = own.filter_map(Count::due).collect();
-            plant.tell_maintenance(&drive.line().0.to_string(), drive.name(), &due);
+            plant.tell_maintenance(drive.line().0.as_ref(), drive.name(), &due);
         }
     }
 }
