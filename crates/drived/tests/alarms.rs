@@ -132,7 +132,7 @@ fn maintenance_is_an_alarm_after_so_many_starts_until_somebody_says_that_it_was_
     let daemon = plant.daemon();
     for _ in 0..2 {
         assert_eq!(plant.alarms(&["list"])["alarms"], Value::Array(Vec::new()));
-        run(&["start", "pump", "--frequency", "20", "--socket", &plant.socket]).assert_done();
+        run(&["start", "pump", "--setpoint", "20Hz", "--socket", &plant.socket]).assert_done();
         run(&["stop", "pump", "--socket", &plant.socket]).assert_done();
     }
     let due = plant.alarm_within(COUNTED, "it is due", |alarm| alarm["kind"] == "maintenance");

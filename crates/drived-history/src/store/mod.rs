@@ -108,9 +108,19 @@ pub fn open_to_read(path: &Path) -> Result<Connection, StoreError> {
         return Err(StoreError::Missing(path.to_owned()));
     }
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let connection = Connection::open_with_flags(path, flags)?;
+    let mut connection = Connection::open_with_flags(path, flags)?;
     connection.busy_timeout(PATIENCE)?;
-    let version = check(&connection, path)?;
+    let version = match check(&connection, path) {
+        // Beside a file without a log SQLite makes an empty one, which it cannot where nothing is written: nobody changes it there either.
+        Err(StoreError::Sql(error))
+            if error.sqlite_error_code() == Some(ErrorCode::CannotOpen) && !has_log(path) =>
+        {
+            let unchanging = format!("file:{}?immutable=1", in_uri(path));
+            connection = Connection::open_with_flags(unchanging, flags | OpenFlags::SQLITE_OPEN_URI)?;
+            check(&connection, path)?
+        }
+        version => version?,
+    };
     if version == 0 {
         return Err(StoreError::Missing(path.to_owned()));
     }
@@ -122,6 +132,16 @@ pub fn open_to_read(path: &Path) -> Result<Connection, StoreError> {
         connection.execute_batch(schema::QUARTERS_OF_NONE)?;
     }
     Ok(connection)
+}
+
+/// Whether something stands beside a file that is not carried over into it.
+fn has_log(path: &Path) -> bool {
+    Kept::at(path).beside(BESIDE[0]).path().try_exists().unwrap_or(true)
+}
+
+/// A path as a part of a URI.
+fn in_uri(path: &Path) -> String {
+    path.to_string_lossy().replace('%', "%25").replace('?', "%3F").replace('#', "%23")
 }
 
 /// Puts a file aside that is found damaged while it is written; the store is closed first.

@@ -372,7 +372,7 @@ fn rules_of_the_table() -> String {
             _ => "",
         };
         let whose = match kind {
-            AlarmKind::Drive(_) => "{{ $labels.name }}",
+            AlarmKind::Drive(_) | AlarmKind::Maintenance => "{{ $labels.name }}",
             AlarmKind::LineAway | AlarmKind::LineSilent | AlarmKind::LineFinding => "line {{ $labels.name }}",
             _ => "{{ $labels.instance }}",
         };

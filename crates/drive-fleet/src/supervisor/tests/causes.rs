@@ -88,9 +88,9 @@ fn a_motor_that_was_stopped_at_the_drive_was_not_stopped_by_the_withdrawal_behin
         drive.status.state = State::Stopping;
         drive.status.motion = drive_core::Motion::Braking;
     };
+    type Case<'a> = (&'a str, &'a dyn Fn(&mut Paper), Option<Cause>);
     let is_ours = by_policy(Policy::ReferenceTaken);
-    type Act<'a> = &'a dyn Fn(&mut Paper);
-    let cases: [(&str, Act<'_>, Option<Cause>); 4] = [
+    let cases: [Case<'_>; 4] = [
         ("its output is cut", &lacking(Lack::Output), Some(Cause::Drive)),
         ("the panel has it, and brings it down", &panel, Some(Cause::Drive)),
         ("the panel has brought it down already", &panel_stops, Some(Cause::Drive)),

@@ -10,8 +10,11 @@ use super::{
         body::body,
         facts::{Facts, begins, lasting},
     },
-    silence::{SILENT_TOGETHER_MS, of_supply},
+    evidence::lost_before,
 };
+
+/// Drives that fell silent within this time of each other may have done so together: so much the polls and their repetitions lie apart.
+pub(super) const SILENT_TOGETHER_MS: i64 = 3_000;
 
 /// What a drive that fell silent showed when it was heard again.
 pub(super) struct Back<'a> {
@@ -106,4 +109,12 @@ fn fed(facts: &Facts, connected: &RecordView) -> Option<Sentence> {
         && with_it("state_changed").is_none();
     let text = "it ran on when it was heard again, and a run command of a bus does not outlast the supply of its drive: that was not away";
     runs_on.then(|| Sentence::of(Likely, text).at(at))
+}
+
+/// That a drive whose run command was gone when it was seen again had lost its supply: what else takes a run command away while a drive is silent
+/// is somebody who writes to a drive that does not answer here.
+pub(super) fn of_supply(facts: &Facts, back: &RecordView) -> Option<Sentence> {
+    lost_before(facts, back.time_unix_ms)?;
+    let text = "when it was seen again its run command was gone, as it is behind a loss of supply: its supply was away";
+    Some(Sentence::of(Likely, text).at(back.time_unix_ms))
 }

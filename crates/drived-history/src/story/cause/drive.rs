@@ -10,11 +10,11 @@ use super::{
         body::{Cause, body},
         facts::Facts,
     },
+    back::of_supply,
     evidence::{
         BESIDE_MS, SILENT_MS, asked_before, found_within, inputs_stayed, lost_before, nobody_asked,
         seen_beside,
     },
-    silence::of_supply,
 };
 
 /// No drive is off and on again, and answers, within this time.

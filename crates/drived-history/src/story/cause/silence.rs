@@ -7,12 +7,9 @@ use drived_plant::plant::past::{
 
 use super::{
     super::facts::{Facts, begins},
-    back::{Back, Shows},
-    evidence::{SILENT_MS, TOGETHER_MS, lost_before, names},
+    back::{Back, SILENT_TOGETHER_MS, Shows},
+    evidence::{SILENT_MS, TOGETHER_MS, names},
 };
-
-/// Drives that fell silent within this time of each other may have done so together: so much the polls and their repetitions lie apart.
-pub(super) const SILENT_TOGETHER_MS: i64 = 3_000;
 
 /// Why a drive heard nothing for so long that its watchdog acted.
 pub(super) fn of_silence(facts: &Facts, at: i64) -> Vec<Sentence> {
@@ -153,14 +150,6 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             said
         }
     }
-}
-
-/// That a drive whose run command was gone when it was seen again had lost its supply: what else takes a run command away while a drive is silent
-/// is somebody who writes to a drive that does not answer here.
-pub(super) fn of_supply(facts: &Facts, back: &RecordView) -> Option<Sentence> {
-    lost_before(facts, back.time_unix_ms)?;
-    let text = "when it was seen again its run command was gone, as it is behind a loss of supply: its supply was away";
-    Some(Sentence::of(Likely, text).at(back.time_unix_ms))
 }
 
 /// An alarm as far as it is looked at here.

@@ -5,9 +5,6 @@ use serde_json::{Value, json};
 use super::{Certainty, Says as _, Story, Written, fault};
 use crate::record::Kind;
 
-/// What a drive shows when it is back.
-type Writes = fn(&mut Written);
-
 const LOST: &str = "lost for 1.9 s: slave 1, reading register 3201 (0C81h): the slave is off-line";
 
 fn lost() -> Option<Value> {
@@ -18,6 +15,9 @@ fn lost() -> Option<Value> {
 fn heard(state: &str, control: &str) -> Option<Value> {
     Some(json!({ "status": { "state": state, "control": control } }))
 }
+
+/// What is told when a drive is heard again.
+type Returns = fn(&mut Written);
 
 /// A drive that runs falls silent, its neighbour too if that is said, and is heard again at 306 s with what follows.
 fn silence(name: &str, is_neighbour_lost: bool, back: impl FnOnce(&mut Written)) -> Story {
@@ -52,7 +52,7 @@ fn command_gone(night: &mut Written) {
 
 #[test]
 fn a_drive_that_ran_on_or_whose_watchdog_acted_was_fed_while_it_was_silent() {
-    let backs: [(&str, Writes); 2] = [("on", runs_on), ("watchdog", by_watchdog)];
+    let backs: [(&str, Returns); 2] = [("on", runs_on), ("watchdog", by_watchdog)];
     for (name, back) in backs {
         let story = silence(&format!("fed-{name}"), false, back);
         let likely = story.why(Certainty::Likely);
@@ -83,7 +83,7 @@ fn a_supply_that_is_likely_is_not_told_as_not_known_with_the_next_line() {
 
 #[test]
 fn a_drive_that_stood_or_may_start_by_itself_or_was_not_heard_again_says_nothing_of_its_supply() {
-    let backs: [(&str, Writes); 4] = [
+    let backs: [(&str, Returns); 4] = [
         ("stood", |night| {
             night.event(306_000, "connected", "connected: ready", heard("ready", "bus"));
         }),

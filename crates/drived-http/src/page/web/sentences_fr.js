@@ -45,6 +45,7 @@ export const SENTENCES_FR = {
   // What to do about alarms that are of no drive.
   'look at its adapter or serial server, and at the plug': 'examiner son adaptateur ou son serveur série, et la prise',
   'look at the motors, then at the cable of the line and at the supply of its drives': 'regarder les moteurs, puis le câble de la ligne et l’alimentation de ses variateurs',
+  'have it done, and say so: drived alarms done NUMBER': 'faites-le faire, et dites-le : drived alarms done NUMÉRO',
   'drived doctor says more': 'drived doctor en dit davantage',
   'see whether its disk is full; the log of the program says why': 'voir si son disque est plein ; le journal du programme dit pourquoi',
   'see what is said of it, mend the file, and read it again': 'voir ce qui en est dit, corriger le fichier et le relire',

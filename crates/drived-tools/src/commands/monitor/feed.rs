@@ -8,15 +8,21 @@ use tokio::{
     time::{sleep, timeout},
 };
 
-use super::model::{News, Wanted};
-use drived_client::{Daemon, Frames, Heard, Way};
-use drived_plant::plant::recent::RecentView;
-use drived_words::failure::Failure;
+use super::{
+    happening::Happening,
+    model::{News, Wanted},
+};
+use drived_client::{Answer, Daemon, Frames, Heard, Way, path_of};
+use drived_plant::plant::{past::RecordsView, recent::RecentView};
+use drived_words::{failure::Failure, json::unix};
 
 /// From a connection that broke to the next try.
 const AGAIN: Duration = Duration::from_secs(1);
 /// A stream that says nothing for so long is none: there is a sign of life each 5 s.
 const SILENT_AFTER: Duration = Duration::from_secs(12);
+/// So much is read of what the history has kept, the newest of it: behind any number that there is.
+const KEPT: usize = 200;
+const NEWEST: i64 = (1 << 53) - 1;
 /// Between two readings of what is looked at.
 const LOOK: Duration = Duration::from_secs(1);
 
@@ -46,7 +52,8 @@ async fn streamed(way: &Way, news: &Sender<News>) -> Result<(), Failure> {
     // What happened before is told by both, and is taken once.
     recent.retain(|one| one.revision <= since);
     let gone = || Failure::Drive("nobody looks any more".to_owned());
-    news.send(News::State { state: Box::new(state), recent }).await.map_err(|_| gone())?;
+    let kept = before(&mut daemon, recent.first()).await;
+    news.send(News::State { state: Box::new(state), recent, kept }).await.map_err(|_| gone())?;
     let answer = timely(daemon.send("GET", &format!("/api/v1/events?since={since}"), None)).await?;
     if !answer.status().is_success() {
         return Err(Failure::Drive(format!("the daemon answers {}", answer.status())));
@@ -64,6 +71,20 @@ async fn streamed(way: &Way, news: &Sender<News>) -> Result<(), Failure> {
             }
         }
     }
+}
+
+/// What the history has kept of the time before the daemon remembers, the newest last; nothing where none is kept.
+async fn before(daemon: &mut Daemon, oldest: Option<&RecentView>) -> Vec<Happening> {
+    let oldest = oldest.and_then(|one| Happening::lately(&one.what)).map(|one| one.unix_ms);
+    let to = oldest.unwrap_or_else(|| unix(tokio::time::Instant::now()));
+    let path = format!(
+        "{}?from_unix_ms=0&to_unix_ms={}&before={NEWEST}&limit={KEPT}",
+        path_of(&["history", "records"]),
+        to.saturating_sub(1)
+    );
+    let told = timely(daemon.get(&path)).await.and_then(Answer::done::<RecordsView>);
+    let records = told.map(|told| told.records).unwrap_or_default();
+    records.iter().rev().filter_map(Happening::kept).collect()
 }
 
 /// Reads what is wanted, for as long as it is.

@@ -3,6 +3,7 @@
 use super::words;
 use drived_plant::plant::{
     commands::OutcomeWord,
+    past::RecordView,
     recent::Happened,
     views::{CommandView, HappenedView, SeveralView},
 };
@@ -54,6 +55,16 @@ impl Happening {
         match what {
             Happened::Command(told) => Some(Self::commanded(told)),
             what => what.event().map(|event| Self::happened(&event)),
+        }
+    }
+
+    /// Takes what the history has kept; nothing where that is told otherwise.
+    pub(super) fn kept(record: &RecordView) -> Option<Self> {
+        let body = record.body.as_ref()?.get();
+        match &*record.kind {
+            "command" => serde_json::from_str(body).ok().map(|told| Self::commanded(&told)),
+            "event" | "notice" => serde_json::from_str(body).ok().map(|told| Self::happened(&told)),
+            _ => None,
         }
     }
 

@@ -185,7 +185,7 @@ fn locked(model: &Mutex<Model>) -> MutexGuard<'_, Model> {
 pub fn screen_of(state: drived_plant::plant::views::StateView) -> String {
     let now = Instant::now();
     let mut model = Model::new("a test".to_owned(), now);
-    model.take(model::News::State { state: Box::new(state), recent: Vec::new() }, now);
+    model.take(model::News::State { state: Box::new(state), recent: Vec::new(), kept: Vec::new() }, now);
     let backend = ratatui::backend::TestBackend::new(400, 24);
     let mut terminal = ratatui::Terminal::new(backend).expect("it has a size");
     terminal.draw(|frame| view::draw(&mut model, now, frame)).expect("it is drawn");

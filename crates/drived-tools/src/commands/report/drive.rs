@@ -7,7 +7,7 @@ use tokio::time::Instant;
 
 use super::{
     gather::DriveTold,
-    parameters,
+    parameters, past,
     words::{cell, facts, milliseconds, moment, own, share, table, unread, untold},
 };
 use crate::commands::param::file::Backup;
@@ -35,6 +35,7 @@ pub(super) fn chapter(drive: &DriveTold, before: Option<&[Backup]>) -> Markup {
                 h4 { "What nobody can know of it" }
                 ul { @for said in &drive.view.not_known { li { (own(said)) } } }
             }
+            @if let Some(told) = &drive.past { h4 { "The last thirty days" } (past::part(told)) }
             h4 { "Faults" }
             (faults(drive))
             @if let Some(before) = before { h4 { "Changed since the backup" } (parameters::since(drive, before)) }
@@ -255,7 +256,7 @@ fn faults(drive: &DriveTold) -> Markup {
         @if kept == 0 { p.untold { (own("This family keeps no history of faults.")) } }
         @else if faults.history.is_empty() { p { (own("The history of the drive is empty.")) } }
         @else {
-            (table("list", &["history", "code", "mnemonic", "meaning", "what to do"], 9, faults.history.iter().enumerate().map(past).collect()))
+            (table("list", &["history", "code", "mnemonic", "meaning", "what to do"], 9, faults.history.iter().enumerate().map(entry).collect()))
         }
     }
 }
@@ -271,14 +272,14 @@ fn present(fault: Option<Fault>, by_watchdog: bool) -> Markup {
 }
 
 /// A fault of the history, in the order in which the drive keeps it.
-fn past((index, fault): (usize, &Fault)) -> Vec<Markup> {
-    let entry = fault.entry;
+fn entry((index, fault): (usize, &Fault)) -> Vec<Markup> {
+    let known = fault.entry;
     let told = |word: Option<&str>| word.map_or_else(|| cell("–"), own);
     vec![
         cell(index + 1),
         cell(fault.code),
-        cell(entry.map_or("–", |entry| entry.mnemonic)),
-        told(entry.map(|entry| entry.meaning)),
-        told(entry.map(|entry| entry.remedy)),
+        cell(known.map_or("–", |known| known.mnemonic)),
+        told(known.map(|known| known.meaning)),
+        told(known.map(|known| known.remedy)),
     ]
 }

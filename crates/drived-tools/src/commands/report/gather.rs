@@ -1,13 +1,17 @@
 //! Everything that a report is made of, read from a daemon: what could not be read stands there with the reason.
 
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use axum::http::StatusCode;
 use drive_core::Faults;
 use drive_families::Family;
 use futures_util::future::try_join_all;
 use serde::de::DeserializeOwned;
 
 use crate::commands::param::{diff::Comparison, file::Backup, source::Source};
-use drived_client::{Daemon, Way, wanted};
+use drived_client::{Daemon, Way, path_of, wanted};
 use drived_plant::plant::{
+    past::DayView,
     recent::RecentView,
     views::{DriveView, LineDetailView, SettingsView, StateView},
 };
@@ -17,6 +21,9 @@ use drived_words::failure::Failure;
 const SILENT: &str = "the drive did not answer";
 /// Why the parameters were not asked for.
 pub(super) const LEFT_OUT: &str = "left out, as was asked";
+
+/// So far back it is told what a drive did.
+const DAYS_MS: u64 = 30 * 86_400_000;
 
 /// What was read.
 #[derive(Debug)]
@@ -42,6 +49,8 @@ pub(super) struct DriveTold {
     pub(super) settings: Told<SettingsView>,
     pub(super) faults: Told<Faults>,
     pub(super) parameters: Result<Compared, String>,
+    /// What it did lately, day by day; `None` where no history is kept.
+    pub(super) past: Option<Told<Vec<DayView>>>,
 }
 
 /// The parameters of a drive beside the factory setting.
@@ -103,7 +112,8 @@ async fn read_drives(
                 compared(way.connect().await?, view).await,
             ),
         };
-        told.push(DriveTold { view: view.clone(), family, settings, faults, parameters });
+        let past = past(&mut daemon, name).await;
+        told.push(DriveTold { view: view.clone(), family, settings, faults, parameters, past });
     }
     Ok(told)
 }
@@ -133,6 +143,24 @@ fn lines_of(drives: &[&DriveView]) -> Vec<String> {
 
 async fn ask<T: DeserializeOwned>(daemon: &mut Daemon, parts: &[&str]) -> Told<T> {
     daemon.read(parts).await.map_err(|failure| failure.to_string())
+}
+
+/// What the history has kept of a drive, day by day; `None`: the daemon keeps no history.
+async fn past(daemon: &mut Daemon, drive: &str) -> Option<Told<Vec<DayView>>> {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let to = u64::try_from(now.as_millis()).unwrap_or(u64::MAX);
+    let name = path_of(&[drive]);
+    let name = name.rsplit('/').next().unwrap_or_default();
+    let path = format!(
+        "{}?drive={name}&from_unix_ms={}&to_unix_ms={to}",
+        path_of(&["history", "days"]),
+        to.saturating_sub(DAYS_MS)
+    );
+    match daemon.get(&path).await {
+        Ok(answer) if answer.status == StatusCode::NOT_FOUND => None,
+        Ok(answer) => Some(answer.done().map_err(|failure| failure.to_string())),
+        Err(failure) => Some(Err(failure.to_string())),
+    }
 }
 
 /// Reads the parameters of a drive and compares them with its factory setting.

@@ -7,6 +7,7 @@ mod line;
 mod own;
 mod page;
 mod parameters;
+mod past;
 mod plot;
 mod program;
 mod sheet;

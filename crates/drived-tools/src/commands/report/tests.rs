@@ -223,12 +223,56 @@ async fn hostile_names_are_shown_as_they_are_written_and_do_nothing() {
     assert!(bare.into_iter().all(|outside| !outside.contains("onerror")));
 }
 
+/// Two days of a drive, as the API tells them.
+fn days() -> Vec<drived_plant::plant::past::DayView> {
+    let day = |day: &str, running_ms: u64, trips: serde_json::Value| {
+        serde_json::json!({
+            "drive": "pump", "day": day, "start_unix_ms": 0, "known": 0.5, "running_ms": running_ms, "starts": 3, "trips": trips,
+            "above_limits_ms": 60_000, "warning_ms": 0, "greatest_current_a": 7.25,
+            "energy": { "amount": 1.25, "from": "summed" },
+        })
+    };
+    let all = [
+        day("2026-11-22", 7_200_000, serde_json::json!({ "9 OCF: overcurrent": 2 })),
+        day(
+            "2026-11-23",
+            3_600_000,
+            serde_json::json!({ "9 OCF: overcurrent": 1, "16 OHF: drive overheating": 1 }),
+        ),
+    ];
+    serde_json::from_value(all.into()).unwrap()
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_the_history_kept_of_the_last_days_is_told_of_each_drive_and_nothing_where_none_is_kept() {
+    let bench = Bench::new();
+    let mut gathered = bench.read(false).await;
+    assert!(!html(&gathered).contains("The last thirty days"), "the line alone keeps no history");
+    gathered.drives[0].past = Some(Ok(days()));
+    let told = chapter(&html(&gathered), gathered.drives[0].name());
+    for expected in [
+        "3 h",
+        "6",
+        "2.5 kWh summed up from its power",
+        "50 %",
+        "7.2 A",
+        "3 × 9 OCF: overcurrent",
+        "1 × 16 OHF",
+    ] {
+        assert!(told.contains(expected), "{expected}: {told}");
+    }
+    gathered.drives[0].past = Some(Err("the disk is full".to_owned()));
+    assert!(chapter(&html(&gathered), gathered.drives[0].name()).contains("not read: the disk is full"));
+}
+
 #[tokio::test(start_paused = true)]
 async fn the_words_of_a_report_are_french_and_none_is_missing() {
     let bench = Bench::new();
     bench.machine(Family::ATV312).trip(9);
     bench.machine(Family::ATV28).mute();
-    let gathered = bench.read(true).await;
+    let mut gathered = bench.read(true).await;
+    gathered.drives[0].past = Some(Ok(days()));
+    gathered.drives[1].past = Some(Ok(Vec::new()));
     let english = html(&gathered);
     let others = of_others(&gathered);
     let missing = super::french::untranslated(&english);

@@ -29,7 +29,12 @@ const ACCOUNTS: usize = 3;
 #[derive(Debug, Clone)]
 pub(super) enum News {
     /// The whole state, and what happened before.
-    State { state: Box<StateView>, recent: Vec<RecentView> },
+    State {
+        state: Box<StateView>,
+        recent: Vec<RecentView>,
+        /// What the history has kept of before.
+        kept: Vec<Happening>,
+    },
     /// An event of the stream.
     Heard(Heard),
     /// The connection is gone; it is tried again.
@@ -120,7 +125,7 @@ impl Model {
 
     pub(super) fn take(&mut self, news: News, now: Instant) {
         match news {
-            News::State { state, recent } => self.plant.begin(*state, &recent, now),
+            News::State { state, recent, kept } => self.plant.begin(*state, &recent, kept, now),
             News::Heard(heard) => self.plant.take(heard, now),
             News::Interrupted(why) => self.plant.interrupted(why, now),
             News::History { drive, history } => {

@@ -85,7 +85,13 @@ impl Plant {
     }
 
     /// Begins anew with a whole state, and with what happened until then.
-    pub(super) fn begin(&mut self, state: StateView, recent: &[RecentView], now: Instant) {
+    pub(super) fn begin(
+        &mut self,
+        state: StateView,
+        recent: &[RecentView],
+        kept: Vec<Happening>,
+        now: Instant,
+    ) {
         self.connection = Connection::Live;
         self.heard = now;
         self.may_stop = state.daemon.rights.stop;
@@ -97,6 +103,10 @@ impl Plant {
         // A daemon that was started anew does not know what the one before it told.
         let oldest = told.front().map_or(u64::MAX, |one| one.unix_ms);
         self.happenings.retain(|one| one.unix_ms < oldest);
+        // On opening nothing is known of before it either.
+        if self.happenings.is_empty() {
+            self.happenings.extend(kept.into_iter().filter(|one| one.unix_ms < oldest));
+        }
         self.happenings.extend(told);
         self.trim();
     }

@@ -15,6 +15,7 @@ use tokio::{
 use super::{
     super::{
         account::{Progress, Stop},
+        happening::Happening,
         model::{Ask, Model, News, View},
     },
     draw,
@@ -99,7 +100,8 @@ fn state(drives: &[Value]) -> Value {
 
 fn told(state: Value, recent: Value) -> News {
     let state = serde_json::from_value(state).unwrap_or_else(|error| panic!("{error}"));
-    News::State { state, recent: serde_json::from_value(recent).unwrap_or_else(|error| panic!("{error}")) }
+    let recent = serde_json::from_value(recent).unwrap_or_else(|error| panic!("{error}"));
+    News::State { state, recent, kept: Vec::new() }
 }
 
 /// A stop of which this is told, and what every command tells.
@@ -490,6 +492,46 @@ fn events_tell_who_asked_from_where_what_came_of_it_and_how_long_it_took_also_fr
     monitor.press(KeyCode::Char('f'));
     let screen = monitor.screen(100, 24);
     assert!(screen.contains(told) && !screen.contains("OLF"), "{screen}");
+}
+
+#[test]
+fn what_the_history_has_kept_from_before_the_daemon_began_is_there_on_opening_and_once() {
+    let began = 1_700_000_000_000_u64;
+    let event = |at: u64, text: &str| {
+        json!({"kind": "event", "time_unix_ms": at, "drive": "pump 1", "event": "tripped", "alarm": true, "order": 1,
+               "cause": {"by": "drive"},
+               "fault": {"by_watchdog": false, "time_unix_ms": at, "at_trip": {"state": "fault", "raw": []}}, "text": text})
+    };
+    let record = |number: i64, kind: &str, body: &Value| {
+        let record = json!({"number": number, "run": 1, "time_unix_ms": body["time_unix_ms"], "steady_ms": 0, "kind": kind,
+                            "what": "tripped", "drive": "pump 1", "alarm": true, "text": "x", "body": body});
+        let record: plant::past::RecordView = serde_json::from_str(&record.to_string()).unwrap();
+        Happening::kept(&record)
+    };
+    let (first, last) =
+        (event(began - 60_000, "tripped: fault 9 OCF"), event(began, "tripped: fault 16 OHF"));
+    let own = record(2, "history", &json!({ "time_unix_ms": began - 50_000 }));
+    assert_eq!(own, None, "what the history tells of itself is none of it");
+    let kept: Vec<Happening> =
+        [record(1, "event", &first), own, record(3, "event", &last)].into_iter().flatten().collect();
+    let mut recent = last.clone();
+    recent["revision"] = 3.into();
+    let _clock = standing_clock();
+    let now = Instant::now();
+    let mut model = Model::new("a test".to_owned(), now);
+    // The connection breaks, and comes back.
+    for _ in 0..2 {
+        let News::State { state, recent, .. } = told(state(&[drive("pump 1")]), json!([recent])) else {
+            panic!("it tells a state");
+        };
+        model.take(News::State { state, recent, kept: kept.clone() }, now);
+    }
+    let mut monitor = Monitor { model, now, _clock };
+    monitor.press(KeyCode::Char('3'));
+    let screen = monitor.screen(100, 24);
+    assert!(screen.contains("ALARM pump 1: tripped: fault 9 OCF"), "{screen}");
+    assert!(screen.contains("ALARM pump 1: tripped: fault 16 OHF"), "{screen}");
+    assert!(screen.contains("everything: 2"), "each once: {screen}");
 }
 
 #[test]
