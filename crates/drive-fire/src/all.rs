@@ -62,7 +62,10 @@ const PARTS: [Part; 9] = [
     ("matrix", 40, |turn| {
         Ok((vec![matrix::run(turn.seed, u64::MAX, turn.go_on())], turn.hunt(|| [matrix::find_again()])))
     }),
-    ("worlds", 30, |turn| Ok((vec![story::run(turn.seed, u64::MAX, turn.go_on())], Vec::new()))),
+    ("worlds", 30, |turn| {
+        let tried = vec![story::run(turn.seed, u64::MAX, turn.go_on())];
+        Ok((tried, turn.hunt(|| [matrix::find_again_by_stories()])))
+    }),
     // Nothing is drawn in them: a second round would explore the same.
     ("model", 400, |turn| {
         let tried = turn.hunt(|| DEPTHS.map(|(model, depth, _)| model::run(model, depth, turn.go_on())));
