@@ -214,12 +214,10 @@ impl fmt::Display for Summary {
         writeln!(f, "\n{:<24}{:<26}{:>7}{:>11}{:>8}", "part", "tried", "found", "plants", "time")?;
         for row in rows {
             let Row { name, lacks, .. } = row;
-            if let Some(lacks) = lacks {
-                writeln!(
-                    f,
-                    "{name:<24}did not run, for want of: {}",
-                    lacks.lines().next().unwrap_or_default()
-                )?;
+            if let Some(lacks) = lacks.as_ref().filter(|_| row.tried.is_empty()) {
+                let mut lines = lacks.lines();
+                let first = lines.clone().find(|line| line.starts_with("error")).or_else(|| lines.next());
+                writeln!(f, "{name:<24}did not run, for want of: {}", first.unwrap_or_default())?;
                 continue;
             }
             let found: usize = row.told().map(|told| told.finds.len()).sum();

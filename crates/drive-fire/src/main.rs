@@ -83,7 +83,7 @@ enum Part {
         /// Whether what a wrong program would say is taken for wrong.
         #[arg(long)]
         plants: bool,
-        /// Its gateway beside this mbusd, by two thousand questions.
+        /// Its gateway beside this mbusd, for so many seconds.
         #[arg(long)]
         mbusd: Option<PathBuf>,
     },
@@ -242,7 +242,7 @@ fn main() -> ExitCode {
             }
             let beside = || Ok(env::current_exe()?.with_file_name("drived"));
             let told = program.map_or_else(beside, Ok).and_then(|path| match mbusd {
-                Some(mbusd) => program::beside_mbusd(&path, &mbusd, seed, 2_000),
+                Some(mbusd) => program::beside_mbusd(&path, &mbusd, seed, Duration::from_secs(seconds)),
                 None => program::run(&path, seed, Duration::from_secs(seconds), only, go_on),
             });
             match told {

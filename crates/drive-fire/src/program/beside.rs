@@ -6,7 +6,7 @@ use std::{
     net::TcpListener,
     path::Path,
     process::{Child, Command, Stdio},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use fastrand::Rng;
@@ -19,7 +19,8 @@ const PARAMETERS: [u16; 5] = [9001, 9002, 3103, 3104, 3105];
 /// What a 312 tells of its motor and its state, what a 21 does, and what neither has.
 const OTHERS: [u16; 6] = [3201, 3202, 8501, 0xFD00, 0xFE07, 60_000];
 /// The drives of both lines, and one that neither has.
-const UNITS: [u8; 4] = [1, 2, 5, 9];
+const UNITS: [u8; 8] = [1, 1, 2, 2, 5, 5, 5, ABSENT];
+const ABSENT: u8 = 9;
 
 /// mbusd, and the line that it serves.
 struct Mbusd {
@@ -69,7 +70,7 @@ fn question(rng: &mut Rng) -> (Vec<u8>, bool) {
         OTHERS[rng.usize(..OTHERS.len())]
     };
     let count = if is_parameter { 1 } else { [0, 1, 2, 4, 125, 126][rng.usize(..6)] };
-    let function = [3, 3, 3, 3, 4, 1, 2, 0x14, 0x41][rng.usize(..9)];
+    let function = [3, 3, 3, 3, 3, 3, 4, 1, 0x41][rng.usize(..9)];
     let [high, low] = address.to_be_bytes();
     (frame(unit, &[function, high, low, 0, count]), is_parameter && function == 3)
 }
@@ -90,8 +91,15 @@ fn against(asked: &[u8], is_constant: bool, ours: &[u8], theirs: &[u8]) -> Optio
     if own.len() != others.len() {
         return differ("another length");
     }
-    if (function & 0x80 != 0 || is_constant) && own != others {
-        return differ(if is_constant { "another value" } else { "another reason" });
+    // Ours knows its drives, and says of another that there is no way to it, where mbusd has asked in vain (0Ah and 0Bh of the
+    // protocol's section 7); and of a question that has no form the one who reads it may say so, or the one who is asked.
+    let is_known = match (own, others) {
+        ([0x0A], [0x0B]) => asked[6] == ABSENT,
+        ([0x03], [_]) => function & 0x80 != 0 && !(1..=125).contains(&asked[11]),
+        _ => false,
+    };
+    if (function & 0x80 != 0 || is_constant) && own != others && !is_known {
+        return differ(if function & 0x80 == 0 { "another value" } else { "another reason" });
     }
     None
 }
@@ -127,8 +135,8 @@ const DEFECTS: [Defect; 10] = [
         }
         answer
     }),
-    ("0Ah for 0Bh", |mut answer| {
-        if answer[7] & 0x80 != 0 && answer[8] == 0x0B {
+    ("0Ah for every refusal", |mut answer| {
+        if answer[7] & 0x80 != 0 {
             answer[8] = 0x0A;
         }
         answer
@@ -145,14 +153,14 @@ const DEFECTS: [Defect; 10] = [
     }),
 ];
 
-/// So many questions to both.
-pub(super) fn run(plant: &Plant, mbusd: &Path, seed: u64, questions: u64) -> io::Result<Told> {
+/// The same questions to both, for so long.
+pub(super) fn run(plant: &Plant, mbusd: &Path, seed: u64, time: Duration) -> io::Result<Told> {
     let begun = Instant::now();
     let mut told = Told::new("differential, gateway with mbusd", "questions");
     let mbusd = Mbusd::start(mbusd, plant)?;
     let mut rng = Rng::with_seed(seed);
     let mut asked = Vec::new();
-    for _ in 0..questions {
+    while begun.elapsed() < time {
         let (question, is_constant) = question(&mut rng);
         let ours = plant.ask_whole(plant.gateway, &question)?;
         let theirs = plant.ask_whole(mbusd.port, &question)?;

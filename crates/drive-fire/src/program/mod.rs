@@ -45,12 +45,12 @@ impl Target {
         [Self::Http, Self::Gateway, Self::Captures, Self::Configuration, Self::Backup, Self::History];
 }
 
-/// Its gateway beside this mbusd: so many questions to both.
+/// Its gateway beside this mbusd: the same questions to both, for so long.
 ///
 /// # Errors
 /// One of the two cannot be run, or does not answer.
-pub fn beside_mbusd(program: &Path, mbusd: &Path, seed: u64, questions: u64) -> io::Result<Told> {
-    beside::run(&Plant::start(program)?, mbusd, seed, questions)
+pub fn beside_mbusd(program: &Path, mbusd: &Path, seed: u64, time: Duration) -> io::Result<Told> {
+    beside::run(&Plant::start(program)?, mbusd, seed, time)
 }
 
 /// How much more the daemon may hold behind it all, in KiB: caches fill, and allocators keep what they have had.
