@@ -62,7 +62,10 @@ const PARTS: [Part; 9] = [
     ("matrix", 40, |turn| {
         Ok((vec![matrix::run(turn.seed, u64::MAX, turn.go_on())], turn.hunt(|| [matrix::find_again()])))
     }),
-    ("worlds", 30, |turn| Ok((vec![story::run(turn.seed, u64::MAX, turn.go_on())], Vec::new()))),
+    ("worlds", 30, |turn| {
+        let tried = vec![story::run(turn.seed, u64::MAX, turn.go_on())];
+        Ok((tried, turn.hunt(|| [matrix::find_again_by_stories()])))
+    }),
     // Nothing is drawn in them: a second round would explore the same.
     ("model", 400, |turn| {
         let tried = turn.hunt(|| DEPTHS.map(|(model, depth, _)| model::run(model, depth, turn.go_on())));
@@ -211,12 +214,10 @@ impl fmt::Display for Summary {
         writeln!(f, "\n{:<24}{:<26}{:>7}{:>11}{:>8}", "part", "tried", "found", "plants", "time")?;
         for row in rows {
             let Row { name, lacks, .. } = row;
-            if let Some(lacks) = lacks {
-                writeln!(
-                    f,
-                    "{name:<24}did not run, for want of: {}",
-                    lacks.lines().next().unwrap_or_default()
-                )?;
+            if let Some(lacks) = lacks.as_ref().filter(|_| row.tried.is_empty()) {
+                let mut lines = lacks.lines();
+                let first = lines.clone().find(|line| line.starts_with("error")).or_else(|| lines.next());
+                writeln!(f, "{name:<24}did not run, for want of: {}", first.unwrap_or_default())?;
                 continue;
             }
             let found: usize = row.told().map(|told| told.finds.len()).sum();

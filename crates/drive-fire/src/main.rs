@@ -83,6 +83,9 @@ enum Part {
         /// Whether what a wrong program would say is taken for wrong.
         #[arg(long)]
         plants: bool,
+        /// Its gateway beside this mbusd, for so many seconds.
+        #[arg(long)]
+        mbusd: Option<PathBuf>,
     },
     /// Who accepts what: ours and somebody else.
     Differential {
@@ -229,7 +232,7 @@ fn main() -> ExitCode {
         Part::Fuzz { plants: true, .. } => vec![fuzz::find_plants(seed, 20_000)],
         Part::Fuzz { seconds, .. } => vec![fuzz::run(seed, Duration::from_secs(seconds), go_on)],
         Part::Program { plants: true, .. } => vec![program::find_plants()],
-        Part::Program { program, seconds, target, execution, .. } => {
+        Part::Program { program, seconds, target, execution, mbusd, .. } => {
             let known =
                 |name: &String| program::Target::ALL.into_iter().find(|known| format!("{known:?}") == *name);
             let only = target.as_ref().and_then(known).zip(execution);
@@ -238,9 +241,10 @@ fn main() -> ExitCode {
                 return ExitCode::FAILURE;
             }
             let beside = || Ok(env::current_exe()?.with_file_name("drived"));
-            let told = program
-                .map_or_else(beside, Ok)
-                .and_then(|path| program::run(&path, seed, Duration::from_secs(seconds), only, go_on));
+            let told = program.map_or_else(beside, Ok).and_then(|path| match mbusd {
+                Some(mbusd) => program::beside_mbusd(&path, &mbusd, seed, Duration::from_secs(seconds)),
+                None => program::run(&path, seed, Duration::from_secs(seconds), only, go_on),
+            });
             match told {
                 Ok(told) => vec![told],
                 Err(error) => return ended(Err(error)),

@@ -87,12 +87,17 @@ impl Told {
         *self.tally.entry(what.into()).or_default() += more;
     }
 
-    /// The same part once more: what it tells is added. Where both name details the later ones stand.
+    /// The same part once more: what it tells is added; a plant is found once it was found. Where both name details the later ones stand.
     pub fn add(&mut self, again: Self) {
         self.count += again.count;
         self.took += again.took;
         self.finds.extend(again.finds);
-        self.plants.extend(again.plants);
+        for plant in again.plants {
+            match self.plants.iter_mut().find(|known| known.name == plant.name) {
+                Some(known) => known.found_by = known.found_by.take().or(plant.found_by),
+                None => self.plants.push(plant),
+            }
+        }
         for (what, more) in again.tally {
             self.count_as(what, more);
         }
@@ -149,5 +154,22 @@ impl fmt::Display for Find {
             Some(part) => writeln!(f, "    again by: cargo run -p drive-fire -- {part}"),
             None => writeln!(f, "    again by: {replay}"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plant_that_is_hunted_again_is_one_plant_and_found_once_it_was_found() {
+        let told = |found_by: Option<&str>| {
+            let plants = vec![Plant { name: "a".to_owned(), found_by: found_by.map(str::to_owned) }];
+            Told { count: 3, plants, ..Told::new("part", "cases") }
+        };
+        let mut sum = told(None);
+        sum.add(told(Some("the second")));
+        sum.add(told(None));
+        assert_eq!((sum.count, sum.plants_found(), sum.plants.len()), (9, 1, 1));
     }
 }

@@ -59,8 +59,18 @@ pub fn run(seed: u64, size: Size, go_on: impl FnMut() -> bool) -> Told {
     run_with(seed, size, &drive_of, go_on)
 }
 
+impl Size {
+    fn replay(self, seed: u64) -> String {
+        let Self { lines, drives, time } = self;
+        format!(
+            "drive-fire soak --seed {seed} --hours {} --lines {lines} --drives {drives}",
+            time.as_secs() / 3_600
+        )
+    }
+}
+
 /// How much a planted defect is given: a drive of each family on each line.
-const SMALL: Size = Size { lines: 4, drives: 5, time: Duration::from_secs(2 * 3_600) };
+const SMALL: Size = Size { lines: 2, drives: 5, time: Duration::from_secs(3_600) };
 
 /// Lives through a small one with each planted defect, or `only` this one.
 pub fn find_plants(seed: u64, only: Option<&str>) -> Told {
@@ -72,7 +82,9 @@ pub fn find_plants(seed: u64, only: Option<&str>) -> Told {
         told.count += lived.count;
         let first = |find: &Find| find.what.chars().take(200).collect::<String>().replace('\n', " ");
         let name = format!("{name}{}", if reached { "" } else { " (its line was never reached)" });
-        told.plants.push(Plant { name, found_by: lived.finds.first().map(first) });
+        let plant = Plant { name, found_by: lived.finds.first().map(first) };
+        eprintln!("{plant:?}");
+        told.plants.push(plant);
     }
     told.took = begun.elapsed();
     told
@@ -101,7 +113,7 @@ fn run_with(seed: u64, size: Size, open: &dyn Fn(Family) -> Box<Open>, go_on: im
     if let Err(panic) = seen {
         let what = panic.downcast_ref::<String>().cloned().unwrap_or_default();
         let what: String = what.chars().take(3_000).collect();
-        told.finds.push(Find { what, replay: format!("drive-fire soak --seed {seed}") });
+        told.finds.push(Find { what, replay: size.replay(seed) });
     }
     told.took = begun.elapsed();
     told
@@ -171,8 +183,7 @@ async fn live(
         told.count_as(*what, *count);
     }
     told.details.push(format!("longest stop until it was told: {:.1} s", kept.longest_stop.as_secs_f64()));
-    let mut find =
-        |what: String| told.finds.push(Find { what, replay: format!("drive-fire soak --seed {seed}") });
+    let mut find = |what: String| told.finds.push(Find { what, replay: size.replay(seed) });
     if kept.told != kept.given {
         find(format!("{} of {} commands were told", kept.told, kept.given));
     }

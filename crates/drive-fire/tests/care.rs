@@ -3,10 +3,12 @@
 use std::{
     collections::BTreeSet,
     fs,
+    io::Write as _,
     path::{Path, PathBuf},
-    process::Command,
+    process::{Command, Stdio},
 };
 
+use drive_testing::peers;
 use serde_json::Value;
 
 fn root() -> PathBuf {
@@ -71,6 +73,41 @@ fn every_licence_is_on_the_list() {
         .collect();
     assert!(packages.len() > 100, "{}", packages.len());
     assert_eq!(wrong, Vec::<String>::new());
+}
+
+/// The schema of CycloneDX 1.5, strictly, by its own library: what it does not know is wrong.
+#[test]
+fn the_bill_of_materials_is_what_its_schema_says() {
+    const JUDGES: &str = "import sys\n\
+        from cyclonedx.schema import SchemaVersion\n\
+        from cyclonedx.validation.json import JsonStrictValidator\n\
+        wrong = JsonStrictValidator(SchemaVersion.V1_5).validate_str(sys.stdin.read())\n\
+        sys.exit(str(wrong)[:400] if wrong else 0)";
+    let Some(python) = peers::python_with("jsonschema, cyclonedx.validation.json") else { return };
+    let bill = match drive_fire::sbom::bill(&root(), "drived") {
+        Ok(bill) => bill,
+        Err(error) => {
+            eprintln!("skipped: cargo cannot tell offline: {error}");
+            return;
+        }
+    };
+    let judge = |bill: &Value| {
+        let mut child = Command::new(&python)
+            .args(["-c", JUDGES])
+            .stdin(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("it is run");
+        let mut asked = child.stdin.take().expect("it is asked");
+        asked.write_all(bill.to_string().as_bytes()).expect("it reads");
+        drop(asked);
+        let told = child.wait_with_output().expect("it ends");
+        if told.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&told.stderr).into_owned()) }
+    };
+    assert_eq!(judge(&bill), Ok(()));
+    let mut wrong = bill.clone();
+    wrong["components"][0]["type"] = "thing".into();
+    assert!(judge(&wrong).is_err(), "it would take anything");
 }
 
 /// How many points of levels 1 and 2 each section of OWASP ASVS 5.0.0 has.

@@ -2,7 +2,10 @@
 
 use drive_core::{Direction, StopMode};
 use drive_fire::{
-    matrix::{Cell, Event, FarEnd, Fault, Lived, Operation, Plane, Subject, Way, live, open},
+    matrix::{
+        Cell, Event, FarEnd, Fault, Lived, Operation, Plane, Subject, Way, drive_of, live, open,
+        story::Story, tell,
+    },
     model::master::{Setting, Step, lives},
 };
 
@@ -76,6 +79,19 @@ fn no_cell_that_was_a_find_is_one_again() {
         let cell = Cell::named(name).expect("it is a cell");
         let why = against(&cell);
         assert!(why.is_empty(), "{what}: {cell}\n{}", why.join("\n"));
+    }
+}
+
+/// Each of these stories was a find once.
+#[test]
+fn no_story_that_was_a_find_is_one_again() {
+    for (line, what) in [
+        ("5.4.0.o5.l3.o8.o10", "freewheel behind a ramp: told at rest at 5 Hz, as if the ramp had ended"),
+        ("3.4.0.o13.e14.e12", "released to the terminals, which start it: the stories were wrong"),
+    ] {
+        let story = Story::read(line).expect("it is a story");
+        let lived = tell(&story, &*drive_of(story.subject.family()));
+        assert!(!matches!(lived, Lived::Against(_)), "{what}: {}: {lived:?}", story.in_words());
     }
 }
 

@@ -47,11 +47,14 @@ fn fuzzing_finds_what_is_planted() {
 
 /// With `--features plants` those of the line as well.
 #[test]
-fn the_matrix_finds_again_what_is_planted() {
-    let told = matrix::find_again();
-    println!("{told}");
-    assert_eq!((told.plants_found(), &told.finds), (told.plants.len(), &Vec::new()), "{told}");
-    assert!(told.plants.len() >= if cfg!(feature = "plants") { 14 } else { 6 }, "{told}");
+fn matrix_and_stories_find_again_what_is_planted() {
+    for (told, (least, with_the_line)) in
+        [(matrix::find_again(), (6, 14)), (matrix::find_again_by_stories(), (5, 14))]
+    {
+        println!("{told}");
+        assert_eq!((told.plants_found(), &told.finds), (told.plants.len(), &Vec::new()), "{told}");
+        assert!(told.plants.len() >= if cfg!(feature = "plants") { with_the_line } else { least }, "{told}");
+    }
 }
 
 #[test]

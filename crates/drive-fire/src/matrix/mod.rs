@@ -26,7 +26,7 @@ pub use live::{Lived, live, tell};
 #[cfg(feature = "plants")]
 pub(crate) use plants::at_a_line;
 pub(crate) use plants::{Planted, all as planted};
-pub use plants::{find_again, find_plants, find_plants_by_stories};
+pub use plants::{find_again, find_again_by_stories, find_plants, find_plants_by_stories};
 pub use untold::Untold;
 
 use drive_families::Family;

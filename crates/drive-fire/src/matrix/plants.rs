@@ -9,7 +9,7 @@ use drive_testing::{
     mutants::Mutant,
 };
 
-use super::{Cell, Lived, Plane, Subject, live, open, shuffled, story::Story, tell};
+use super::{Cell, Lived, Plane, Subject, live, shuffled, story::Story, tell};
 use crate::report::{Find, Plant, Told};
 
 /// The ways in which a family breaks its contract that show in what it says and does, and not only in how it asks.
@@ -123,26 +123,62 @@ const FOUND: &[(&str, &str)] = &[
     ("line: late-answer-unfeared", "F:2261288"),
 ];
 
+/// The same of the stories.
+const FOUND_BY_STORIES: &[(&str, &str)] = &[
+    (
+        "family: StartConfirmedByAnything",
+        "5.0.0.o4.f35x3.f58x3.o6.o7.l7.o5.f62x0.f33x4.o14.f70x4.o9.l7.f68x5",
+    ),
+    ("family: AlwaysInForce", "2.4.5.e20.o6.o10.o10.o14.l6.f70x5.o11.f30x5.o4.f65x4.o6.e8"),
+    ("family: ForgetEndsTheLease", "6.4.7.f67x2.e9.o5.f47x3.o5"),
+    ("family: StopSentEndsTheLease", "5.3.9.o6.o1.l8.l8.o8.l8"),
+    ("family: NoOutputIsStandstill", "6.4.0.l6.l3.l7.l1.e6.o4.l2.o5.o10.o1.o11.o10.o5.o4"),
+    ("line: another-slaves-answer", "9.0.1.f35x3.l4.l6.o1.f60x5.o10.o3.f10x2.l3"),
+    ("line: crc-unchecked", "7.3.0.o6.l1.o11.f28x3.o7.l6"),
+    ("line: transaction-unchecked", "7.4.0.o11.o5.o3.o11.f12x2.l5.o9.f71x2.o11.l6.f63x2.o11.o8"),
+    ("line: early-answer-believed", "3.0.0.f34x2.o7.o8.e18.o13.f60x1.o2.o8.e8.e15.o6.l1.l2.o0"),
+    ("line: late-answer-unfeared", "8.3.0.l5.o7.l8.f8x2.o6.o6.f72x3.f22x0.e9.f69x1.e1.l1.e5"),
+    ("line: edge-repeated", "2.1.0.l4.l2.f31x0.e10.o1.f25x1.l7.o15.o12.o8.f42x4.f34x0.o11.f33x4"),
+    ("line: command-sent-late", "1.4.0.o5.f16x0.o9.o7.e15.f70x5.e12.o6.l8.o11.f62x2.o5.e5.o5.l8"),
+    ("line: sent-told-as-unsent", "0.4.0.o5.l5.l4.o19.o8.f62x0.l8.o10.o19.o6.f35x3.e18.f16x1.o16.f13x0"),
+    ("line: lost-write-told-as-expired", "6.4.7.f67x2.e9.o5.f47x3.o5"),
+];
+
 /// Each planted defect that the matrix has found, against the cell that found it, which is sound without it.
 pub fn find_again() -> Told {
+    let told = Told::new("fault matrix, against planted defects", "cells");
+    again(told, FOUND, Cell::named, |cell| cell.subject, live, "drive-fire matrix --cell")
+}
+
+/// The same of the stories.
+pub fn find_again_by_stories() -> Told {
+    let told = Told::new("worlds generated, against planted defects", "stories");
+    again(told, FOUND_BY_STORIES, Story::read, |story| story.subject, tell, "drive-fire worlds --story")
+}
+
+fn again<C>(
+    mut told: Told,
+    found: &[(&str, &str)],
+    read: fn(&str) -> Option<C>,
+    subject: fn(&C) -> Subject,
+    lives: fn(&C, &Open) -> Lived,
+    replay: &str,
+) -> Told {
     let begun = Instant::now();
-    let mut told = Told::new("fault matrix, against planted defects", "cells");
     let planted: Vec<(String, Planted)> = all().collect();
-    for (name, by) in FOUND.iter().filter(|(name, _)| cfg!(feature = "plants") || !name.starts_with("line")) {
+    for (name, by) in found.iter().filter(|(name, _)| cfg!(feature = "plants") || !name.starts_with("line")) {
         let plant = planted.iter().find(|(known, _)| known == name).map(|(_, plant)| *plant);
-        let (Some(plant), Some(cell)) = (plant, Cell::named(by)) else {
-            told.finds.push(Find {
-                what: format!("{name} is no plant here, or {by} no cell"),
-                replay: String::new(),
-            });
+        let (Some(plant), Some(case)) = (plant, read(by)) else {
+            let what = format!("{name} is no plant here, or {by} is not read");
+            told.finds.push(Find { what, replay: String::new() });
             continue;
         };
         told.count += 1;
-        let is_found = matches!(plant.attacks(cell.subject, |open| live(&cell, open)).0, Lived::Against(_));
-        if let Lived::Against(why) = live(&cell, &*open(&cell)) {
-            let replay = format!("drive-fire matrix --cell {by}");
-            told.finds
-                .push(Find { what: format!("{cell} without a plant\n    {}", why.join("\n    ")), replay });
+        let subject = subject(&case);
+        let is_found = matches!(plant.attacks(subject, |open| lives(&case, open)).0, Lived::Against(_));
+        if let Lived::Against(why) = lives(&case, &*super::drive_of(subject.family())) {
+            let what = format!("{by} without a plant\n    {}", why.join("\n    "));
+            told.finds.push(Find { what, replay: format!("{replay} {by}") });
         }
         told.plants.push(Plant { name: (*name).to_owned(), found_by: is_found.then(|| (*by).to_owned()) });
     }

@@ -2,6 +2,7 @@
 //! are given files that somebody else has changed. It does not panic, it ends or goes on, it says nothing that has no form, it keeps no more
 //! than it kept before, and what is asked rightly behind all that is answered rightly.
 
+mod beside;
 mod doors;
 mod files;
 mod judge;
@@ -42,6 +43,14 @@ impl Target {
     /// All of them.
     pub const ALL: [Self; 6] =
         [Self::Http, Self::Gateway, Self::Captures, Self::Configuration, Self::Backup, Self::History];
+}
+
+/// Its gateway beside this mbusd: the same questions to both, for so long.
+///
+/// # Errors
+/// One of the two cannot be run, or does not answer.
+pub fn beside_mbusd(program: &Path, mbusd: &Path, seed: u64, time: Duration) -> io::Result<Told> {
+    beside::run(&Plant::start(program)?, mbusd, seed, time)
 }
 
 /// How much more the daemon may hold behind it all, in KiB: caches fill, and allocators keep what they have had.

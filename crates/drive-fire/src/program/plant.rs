@@ -18,15 +18,47 @@ pub(super) struct Plant {
     pub(super) folder: PathBuf,
     pub(super) http: u16,
     pub(super) gateway: u16,
-    sim: Child,
+    line: Line,
     daemon: Option<Child>,
+}
+
+/// A simulated line.
+pub(super) struct Line {
+    path: PathBuf,
+    sim: Child,
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        let _ = self.sim.kill();
+        let _ = self.sim.wait();
+    }
+}
+
+impl Line {
+    /// It ends with its standard input.
+    fn start(program: &Path, path: PathBuf) -> io::Result<Self> {
+        let sim = Command::new(program)
+            .args(["sim", "--drive", "atv312@1-2", "--drive", "atv21@5"])
+            .args(["--baud", "19200", "--format", "8E1", "--pty"])
+            .arg(&path)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()?;
+        Ok(Self { path, sim })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
 }
 
 impl Drop for Plant {
     fn drop(&mut self) {
-        for child in self.daemon.iter_mut().chain([&mut self.sim]) {
-            let _ = child.kill();
-            let _ = child.wait();
+        if let Some(daemon) = &mut self.daemon {
+            let _ = daemon.kill();
+            let _ = daemon.wait();
         }
         let _ = fs::remove_dir_all(&self.folder);
     }
@@ -40,30 +72,11 @@ impl Plant {
     pub(super) fn start(program: &Path) -> io::Result<Self> {
         let folder = std::env::temp_dir().join(format!("drive-fire-{}", std::process::id()));
         fs::create_dir_all(&folder)?;
-        let line = folder.join("line");
-        // It ends with its standard input.
-        let sim = Command::new(program)
-            .args([
-                "sim",
-                "--drive",
-                "atv312@1-2",
-                "--drive",
-                "atv21@5",
-                "--baud",
-                "19200",
-                "--format",
-                "8E1",
-                "--pty",
-            ])
-            .arg(&line)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()?;
+        let line = Line::start(program, folder.join("line"))?;
         let (http, gateway) = (free_port()?, free_port()?);
-        let mut plant = Self { program: program.to_owned(), folder, http, gateway, sim, daemon: None };
-        plant.until("the simulated line", |_| line.exists())?;
-        fs::write(plant.config(), plant.text(&line))?;
+        let mut plant = Self { program: program.to_owned(), folder, http, gateway, line, daemon: None };
+        plant.until("the simulated line", |plant| plant.line.path.exists())?;
+        fs::write(plant.config(), plant.text(&plant.line.path))?;
         let log = File::create(plant.folder.join("log"))?;
         let daemon = plant
             .tool()
@@ -86,6 +99,13 @@ impl Plant {
                 || text.matches("output_frequency").count() >= 3
         })?;
         Ok(plant)
+    }
+
+    /// Another line with the same drives, which this daemon does not serve.
+    pub(super) fn another_line(&self) -> io::Result<Line> {
+        let line = Line::start(&self.program, self.folder.join("another"))?;
+        self.until("another simulated line", |_| line.path.exists())?;
+        Ok(line)
     }
 
     pub(super) fn config(&self) -> PathBuf {
@@ -121,7 +141,7 @@ impl Plant {
     }
 
     #[allow(clippy::disallowed_methods, reason = "nothing asynchronous stands here")]
-    fn until(&self, what: &str, is_there: impl Fn(&Self) -> bool) -> io::Result<()> {
+    pub(super) fn until(&self, what: &str, is_there: impl Fn(&Self) -> bool) -> io::Result<()> {
         let begun = Instant::now();
         while !is_there(self) {
             if begun.elapsed() > READY {
@@ -151,6 +171,19 @@ impl Plant {
             }
             _ => Ok(answer),
         }
+    }
+
+    /// The one frame of Modbus TCP that answers another.
+    pub(super) fn ask_whole(&self, port: u16, frame: &[u8]) -> io::Result<Vec<u8>> {
+        let mut stream = TcpStream::connect(("127.0.0.1", port))?;
+        stream.set_read_timeout(Some(Duration::from_secs(10)))?;
+        stream.write_all(frame)?;
+        let mut answer = vec![0; 6];
+        stream.read_exact(&mut answer)?;
+        let mut rest = vec![0; u16::from_be_bytes([answer[4], answer[5]]).into()];
+        stream.read_exact(&mut rest)?;
+        answer.extend(rest);
+        Ok(answer)
     }
 
     /// What the daemon has said on its standard error.

@@ -153,6 +153,7 @@ impl<P: Port> ProfileDrive<P> {
             let is_held = !may_come_down || output.is_some_and(|output| holds(output, &mut lowest));
             if because.is_none() && turns && is_held {
                 self.has_ended = false;
+                self.lets_coast = false;
                 self.agreed = self.setpoint_seen(&words);
                 let verdict = self.watch.run.verdict(&self.evidence(&status, &words));
                 return Ok(Status { verdict, ..status });
@@ -180,6 +181,7 @@ impl<P: Port> ProfileDrive<P> {
             return Err(Error::Unsupported { what: "a stop", reason: "its profile has none" });
         };
         self.has_ended = true;
+        self.lets_coast |= mode == StopMode::Freewheel;
         // What the drive shows is no proof of a stop that it has refused or never got: behind a trip, or a state in which no motor turns,
         // the run command may stand and act when that goes away.
         let mut written = self.write_stop(action, order).await?;

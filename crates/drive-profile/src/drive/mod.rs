@@ -43,6 +43,8 @@ pub struct ProfileDrive<P> {
     kept: Option<i32>,
     /// A word of this side that ends its run command was written, and no start was confirmed since.
     has_ended: bool,
+    /// A stop of this side that cuts the output was written, and no start was confirmed since: an output that is gone has not come down.
+    lets_coast: bool,
     /// A stop of this side was seen, and the motor may still come down by it: its output then.
     comes_down: Option<u32>,
 }
@@ -64,6 +66,7 @@ impl<P: Port> ProfileDrive<P> {
             agreed: None,
             kept: None,
             has_ended: false,
+            lets_coast: false,
             comes_down: None,
         }
     }

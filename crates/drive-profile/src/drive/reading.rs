@@ -212,7 +212,7 @@ impl<P: Port> ProfileDrive<P> {
                     Output::NotKnown
                 }
                 // Behind a stop of this side another may stand by now.
-                _ if self.watch.shaft.was_braked() => Output::Gone,
+                _ if self.watch.shaft.was_braked() && !self.lets_coast => Output::Gone,
                 _ => Output::Cut,
             },
             State::Unknown => Output::NotKnown,
