@@ -53,6 +53,43 @@ async fn linuxcnc_runs_turns_round_stops_and_resets_a_simulated_wj200() {
     hal.end().await;
 }
 
+/// It sets bit 6 of each command, the second ramp, which the profile does not use. `gs2_vfd` and `vfdb_vfd` have no twin here: they are for a
+/// GS2, of which thirteen words stand in a row at 2100h, and for a VFD-B, whose states at 2101h are others than an MS300's.
+#[tokio::test(flavor = "multi_thread")]
+async fn linuxcnc_runs_turns_round_stops_and_resets_a_simulated_vf_s15() {
+    let Some(folder) = folder() else { return };
+    let bench = Bench::of("vfs15", "9600 8N1");
+    let ini = bench.port.with_extension("ini");
+    let text =
+        format!("[VFS11]\nTYPE=rtu\nDEVICE={}\nBAUD=9600\nPARITY=none\nTARGET=1\n", bench.port.display());
+    std::fs::write(&ini, text).expect("it can be written");
+    let mut hal = Hal::start(&folder, &format!("loadusr -W vfs11_vfd --ini {}", ini.display())).await;
+    let pin = |name: &str| format!("vfs11_vfd.{name}");
+    // 20 rpm are one hertz.
+    hal.set(&pin("nameplate-RPM"), "1000").await;
+    hal.set(&pin("speed-command"), "600").await;
+    hal.set(&pin("spindle-on"), "1").await;
+    hal.set(&pin("enable"), "1").await;
+    bench.until("30 Hz forward", |seen| seen.output_frequency == 3_000).await;
+    hal.until(&pin("at-speed"), "TRUE").await;
+    hal.set(&pin("spindle-fwd"), "0").await;
+    bench.until("30 Hz in reverse", |seen| seen.output_frequency == -3_000).await;
+    hal.set(&pin("speed-command"), "400").await;
+    bench.until("20 Hz in reverse", |seen| seen.output_frequency == -2_000).await;
+    hal.set(&pin("spindle-on"), "0").await;
+    bench.until("rest", |seen| !seen.running && seen.shaft_frequency == 0).await;
+    hal.until(&pin("is-stopped"), "TRUE").await;
+    hal.set(&pin("spindle-fwd"), "1").await;
+    bench.machine.trip(9);
+    hal.until(&pin("trip-code"), "9").await;
+    hal.set(&pin("err-reset"), "1").await;
+    bench.until("the reset", |seen| seen.trip.is_none()).await;
+    assert!(!bench.machine.observe().running, "a reset is no start");
+    hal.until(&pin("trip-code"), "0").await;
+    hal.end().await;
+    let _ = std::fs::remove_file(ini);
+}
+
 /// The folder of its packages.
 fn folder() -> Option<PathBuf> {
     let folder = env::var_os("DRIVED_LINUXCNC").map(PathBuf::from);

@@ -40,6 +40,8 @@ pub struct Machine {
     surroundings: &'static Surroundings,
     /// What was written, by its place.
     kept: Cells,
+    /// The bits that the profile names of what commands it: another does nothing, whoever sets it.
+    named: Arc<Cells>,
     motor: Motor,
     /// The run command that is in force.
     order: Option<Direction>,
@@ -77,6 +79,7 @@ impl Machine {
             rules,
             surroundings: Box::leak(Box::new(around)),
             kept: BTreeMap::new(),
+            named: Arc::new(named(&profile)),
             motor: Motor::new(Nameplate {
                 nominal_frequency: FULL_SCALE.centihertz(),
                 ..Nameplate::light(24)
@@ -144,8 +147,15 @@ impl Machine {
         }
     }
 
+    /// A word as it is taken: without the bits of a command that the profile does not name.
+    fn heard(&self, written: Written) -> Written {
+        let named = self.named.get(&(written.space, written.address)).copied().unwrap_or(u16::MAX);
+        Written { value: written.value & named, ..written }
+    }
+
     /// What a word does that was written.
     fn obey(&mut self, written: Written) {
+        let written = self.heard(written);
         let profile = self.profile.clone();
         let file = profile.file();
         let writes = |action: &crate::format::Answer<crate::format::Spanned<crate::format::Action>>| {
@@ -187,6 +197,8 @@ impl Machine {
                 self.order = Some(Direction::Forward);
             } else if stands(&file.start.reverse) {
                 self.order = Some(Direction::Reverse);
+            } else if self.run_word_ends(written) {
+                (self.order, self.ramp) = (None, RAMP);
             }
         }
         // A run command that comes to a drive that has tripped or has no supply is lost.
@@ -195,12 +207,22 @@ impl Machine {
         }
     }
 
+    /// Whether a word takes the place of the run word that stands, and is none.
+    fn run_word_ends(&self, written: Written) -> bool {
+        let file = self.profile.file();
+        let start = self.order.and_then(|direction| self.profile.start(direction));
+        let runs = start.into_iter().flat_map(|start| file.writes(start)).filter(|of| file.runs(*of));
+        let is_its = runs.into_iter().any(|of| (of.space, of.address) == (written.space, written.address));
+        is_its && !file.runs(written)
+    }
+
     /// Whether what an action leaves at a place stands there.
     fn stands(&self, action: &[Written], of: Written) -> bool {
         let place = (of.space, of.address);
         let left = action.iter().rev().find(|other| (other.space, other.address) == place);
         // What nobody has written is 0.
-        left.is_none_or(|left| self.kept.get(&place).copied().unwrap_or(0) == left.value)
+        let held = self.kept.get(&place).copied().unwrap_or(0);
+        left.is_none_or(|left| self.heard(Written { value: held, ..of }).value == left.value)
     }
 
     /// The state that it shows.
@@ -423,6 +445,31 @@ impl Machine {
         let word = words.entry(place).or_insert(0);
         *word = *word & !mask | value & mask;
     }
+}
+
+/// The bits that a profile names of each place at which its drive is commanded.
+fn named(profile: &Profile) -> Cells {
+    let file = profile.file();
+    let runs = file.command.given().into_iter().flat_map(|command| &command.get_ref().runs);
+    let mut named: Cells = BTreeMap::new();
+    for run in runs.map(crate::format::Spanned::get_ref) {
+        let place = file.named(run.register.get_ref()).and_then(|register| file.place(register));
+        named.extend(
+            place.map(|place| (place, named.get(&place).copied().unwrap_or(0) | *run.mask.get_ref())),
+        );
+    }
+    let rungs = file.start.ladder.given().into_iter().flatten().map(crate::format::Spanned::get_ref);
+    let rungs = rungs.filter_map(|rung| {
+        let (space, address) = file.place(file.named(rung.register.as_ref()?.get_ref())?)?;
+        Some(Written { space, address, value: rung.word? })
+    });
+    for written in file.actions().flat_map(|(_, action)| file.writes(action.get_ref())).chain(rungs) {
+        // Where no bit of a register runs the motor, the whole word counts.
+        if let Some(bits) = named.get_mut(&(written.space, written.address)) {
+            *bits |= written.value;
+        }
+    }
+    named
 }
 
 /// Whether two words for one place have one sign, and neither is 0.

@@ -638,7 +638,7 @@ async fn a_shaft_is_told_at_rest_by_what_its_file_names_for_that() {
 /// Its profile has another word for reverse than the machine: the word is taken, and acts on nothing. What turns still turns by its stop.
 #[tokio::test(start_paused = true)]
 async fn a_start_is_not_confirmed_by_a_motor_that_still_comes_down_from_a_stop_of_this_side() {
-    let mut rig = misread("danfoss/danfoss-fc", "danfoss-fc", "words = [0x847C]", "words = [0x8C7C]");
+    let mut rig = misread("danfoss/danfoss-fc", "danfoss-fc", "words = [0x847C]", "words = [0x845C]");
     give(&mut rig, 30).await;
     rig.drive.start(Direction::Forward).await.expect("it starts");
     rig.until_machine("it is at its setpoint", |machine| machine.output_frequency == 3_000).await;
