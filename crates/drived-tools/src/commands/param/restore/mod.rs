@@ -69,6 +69,12 @@ struct Told {
 }
 
 pub(super) async fn run(args: Args) -> Result<(), Failure> {
+    if let Some(path) = args.files.iter().find(|path| !path.exists()) {
+        return Err(Failure::Input(format!(
+            "{}: there is no such file or folder; a drive that is not the one of the file goes behind --to",
+            path.display()
+        )));
+    }
     let files = files(&args.files)?;
     if args.to.is_some() && files.len() > 1 {
         return Err(Failure::Input(
