@@ -14,7 +14,7 @@ use std::{
 };
 
 use drive_testing::peers;
-use support::{File, Running, Sim, path, run};
+use support::{File, Running, Sim, ask, path, run};
 
 /// One browser at a time is enough for a machine with two processors.
 static ONE_BY_ONE: Mutex<()> = Mutex::new(());
@@ -290,6 +290,8 @@ fn look_with(
     while std::net::TcpStream::connect(&address).is_err() {
         std::thread::yield_now();
     }
+    // The system takes a connection before the program knows where its page is, of which it gives links.
+    assert!(!ask(port, "GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").is_empty());
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/page.py");
     let mut looking = Command::new(python)
         .arg(script)
