@@ -1,7 +1,11 @@
 //! The page's French, for whoever tells the same elsewhere: its tables are read as they are served, so that each sentence
 //! stands once.
 
+mod findings;
+
 use std::{collections::HashMap, sync::LazyLock};
+
+pub use self::findings::{FindingFr, finding};
 
 /// The French of a whole sentence or phrase of the daemon or of a manual's table of faults, where the page knows one.
 pub fn sentence(english: &str) -> Option<&'static str> {

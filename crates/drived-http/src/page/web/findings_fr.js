@@ -1,4 +1,5 @@
-// What a line finds wrong with itself, in French: by its kind and its figures, never by the daemon's own sentence.
+// What a line finds wrong with itself, in French: by its kind and its figures, never by the daemon's own sentence. The reports of the
+// command line read these tables as they stand (page/french/findings.rs), line by line: plain strings, one to a line.
 
 /** What an exception says (Modbus Application Protocol V1.1b3, section 7). */
 const EXCEPTIONS = {
@@ -65,8 +66,8 @@ const KINDS = {
     ],
   },
   refuses_all: {
-    says: ({ part, of, code }) =>
-      `${part === of ? `les ${of} questions ont toutes` : `${part} questions sur ${of} ont`} eu pour réponse l’exception ${hex(code)} (${EXCEPTIONS[code] ?? 'que la spécification ne nomme pas'}), aucune n’a eu de valeur`,
+    says: ({ part, of, exception }) => `${part} questions sur ${of} ont eu pour réponse l’exception ${exception}, aucune n’a eu de valeur`,
+    says_all: ({ of, exception }) => `les ${of} questions ont toutes eu pour réponse l’exception ${exception}, aucune n’a eu de valeur`,
     next: [
       'une autre famille que celle qui est nommée, ou un autre appareil, par exemple un compteur, a cette adresse : voir ce qui s’y trouve',
       'drived scan dit quelles familles ce pourrait être',
@@ -90,7 +91,8 @@ const KINDS = {
     next: TWO,
   },
   second_master: {
-    says: ({ part, every_ms: every }) => `quelqu’un d’autre interroge sur cette ligne : ${part} requêtes entendues${every ? `, une toutes les ${seconds(every)} s` : ''}`,
+    says: ({ part }) => `quelqu’un d’autre interroge sur cette ligne : ${part} requêtes entendues`,
+    says_every: ({ part, every }) => `quelqu’un d’autre interroge sur cette ligne : ${part} requêtes entendues, une toutes les ${every} s`,
     next: ['trouver l’autre maître (un automate, un terminal, une passerelle, un second programme) et mettre fin à ses questions : une ligne Modbus en a un seul'],
   },
   number_zero: {
@@ -98,7 +100,7 @@ const KINDS = {
     next: ['l’autre bout ne rend pas le numéro de transaction comme Modbus TCP le veut : voir s’il parle RTU sur TCP (rtu+tcp://), ou prendre le dernier logiciel de son constructeur'],
   },
   fell_silent: {
-    says: ({ part, silent_ms: silent }) => `il répondait, et ne répond plus depuis ${Math.floor(silent / 1000)} s : les ${part} dernières questions n’ont pas apporté un seul octet`,
+    says: ({ part, silent }) => `il répondait, et ne répond plus depuis ${silent} s : les ${part} dernières questions n’ont pas apporté un seul octet`,
     next: [
       'vérifier l’alimentation des variateurs et le câble à l’adaptateur : aucun réglage ne change tout seul',
       'débrancher l’adaptateur et le rebrancher : s’ils répondent alors, c’est lui qui était bloqué',
@@ -114,11 +116,13 @@ const KINDS = {
 export function findingFr(finding) {
   const kind = KINDS[finding.defect];
   if (!kind) return undefined;
+  const { part, of, code, every_ms: every, silent_ms: silent } = finding;
   const alike = ALIKE[finding.alike];
+  const says = (part === of && kind.says_all) || (every && kind.says_every) || kind.says;
   return {
-    text: kind.says(finding),
+    text: says({ part, of, exception: exception(code), every: every && seconds(every), silent: silent && Math.floor(silent / 1000) }),
     alike: alike ? `un maître ne peut pas le distinguer ${alike}` : '',
-    next: (KINDS[`${finding.defect}_${refuser(finding.code)}`] ?? kind).next,
+    next: (KINDS[`${finding.defect}_${refuser(code)}`] ?? kind).next,
   };
 }
 
@@ -128,8 +132,8 @@ function refuser(code) {
   return code === 5 || code === 6 ? 'busy' : '';
 }
 
-function hex(code) {
-  return `${code.toString(16).toUpperCase().padStart(2, '0')}h`;
+function exception(code) {
+  return code && `${code.toString(16).toUpperCase().padStart(2, '0')}h (${EXCEPTIONS[code] ?? 'que la spécification ne nomme pas'})`;
 }
 
 function seconds(ms) {

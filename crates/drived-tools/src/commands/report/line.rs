@@ -36,6 +36,11 @@ impl Verdict {
     }
 }
 
+/// From what a finding cannot be told.
+pub(super) fn cannot_be_told_from(what: &str) -> String {
+    format!("it cannot be told from {what}")
+}
+
 pub(super) fn chapter(detail: &LineDetailView, drives: &[DriveTold]) -> Markup {
     let LineDetailView { line, measured, .. } = detail;
     html! {
@@ -55,7 +60,7 @@ pub(super) fn chapter(detail: &LineDetailView, drives: &[DriveTold]) -> Markup {
                             @match &finding.drive { Some(drive) => (drive), None => (own(&format!("address {slave}"))) } ": "
                         }
                         (own(&finding.text))
-                        @if let Some(what) = &finding.cannot_be_told_from { " (" (own(&format!("it cannot be told from {what}"))) ")" }
+                        @if let Some(what) = &finding.cannot_be_told_from { " (" (own(&cannot_be_told_from(what))) ")" }
                         @for next in &finding.next { "; " (own(next)) }
                     }
                 } }

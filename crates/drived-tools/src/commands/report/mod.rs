@@ -138,7 +138,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let html = page.html().into_string();
     sheet.write(&match args.language {
         Language::En => html,
-        Language::Fr => french::translated(&html),
+        Language::Fr => french::translated(&html, &french::found(gathered.lines.iter().flatten())),
     })?;
     let silent = gathered.silent();
     let written = json!({ "file": args.to, "drives": gathered.drives.len(), "silent": silent });

@@ -265,6 +265,30 @@ async fn what_the_history_kept_of_the_last_days_is_told_of_each_drive_and_nothin
     assert!(chapter(&html(&gathered), gathered.drives[0].name()).contains("not read: the disk is full"));
 }
 
+/// What a line may find wrong with itself, as the API tells it.
+fn found_wrong() -> Vec<drived_plant::plant::views::FindingView> {
+    let found = |finding: &drive_bus::Finding, told_from: Option<&str>| {
+        let mut told = serde_json::json!({
+            "defect": finding.defect.name(), "slave": finding.slave, "cannot_be_told_from": told_from,
+            "text": finding.to_string(), "next": finding.next(),
+        });
+        let figures = serde_json::to_value(drive_fleet::view::FindingFigures::from(finding)).unwrap();
+        told.as_object_mut().unwrap().extend(figures.as_object().unwrap().clone());
+        serde_json::from_value(told).unwrap()
+    };
+    let (refuses, two) = (drive_bus::Defect::RefusesAll(2), drive_bus::Defect::TwoAtOneAddress);
+    let old = drive_bus::Alike::OldAnswers;
+    let certainty = drive_bus::Certainty::CannotBeToldFrom(old);
+    let refuses = drive_bus::Finding {
+        defect: refuses,
+        slave: Some(9),
+        share: (5, 5),
+        certainty: drive_bus::Certainty::Certain,
+    };
+    let two = drive_bus::Finding { defect: two, slave: Some(1), share: (4, 7), certainty };
+    vec![found(&refuses, None), found(&two, Some(&old.to_string()))]
+}
+
 #[tokio::test(start_paused = true)]
 async fn the_words_of_a_report_are_french_and_none_is_missing() {
     let bench = Bench::new();
@@ -273,13 +297,15 @@ async fn the_words_of_a_report_are_french_and_none_is_missing() {
     let mut gathered = bench.read(true).await;
     gathered.drives[0].past = Some(Ok(days()));
     gathered.drives[1].past = Some(Ok(Vec::new()));
+    gathered.lines[0].as_mut().unwrap().line.findings = found_wrong();
+    let found = super::french::found(gathered.lines.iter().flatten());
     let english = html(&gathered);
     let others = of_others(&gathered);
-    let missing = super::french::untranslated(&english);
+    let missing = super::french::untranslated(&english, &found);
     let missing: BTreeSet<_> =
         missing.iter().filter(|text| is_prose(text) && !others.contains(*text)).collect();
     assert!(missing.is_empty(), "{missing:#?}");
-    let french = super::french::translated(&english);
+    let french = super::french::translated(&english, &found);
     for text in [
         "lang=\"fr\"",
         "Les variateurs en un coup d’œil",
@@ -287,6 +313,8 @@ async fn the_words_of_a_report_are_french_and_none_is_missing() {
         "technicien",
         "Mill &amp; Sons",
         "lieu et date",
+        "l’exception 02h (il n’a pas ce registre), aucune n’a eu de valeur",
+        "un maître ne peut pas le distinguer d’un intermédiaire qui redonne d’anciennes réponses",
     ] {
         assert!(french.contains(text), "{text}");
     }

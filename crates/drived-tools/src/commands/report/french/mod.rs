@@ -4,22 +4,26 @@
 mod phrases;
 mod words;
 
-use std::borrow::Cow;
+use std::{borrow::Cow, collections::HashMap};
 
 use drived_http::page::french as page;
+use drived_plant::plant::views::LineDetailView;
 
 use self::{phrases::PHRASES, words::WORDS};
+use super::line::cannot_be_told_from;
 
 /// A document whose own words are French: headings, labels, heads of tables, and what is marked as the program's; and whose
 /// numbers are written with a comma.
-pub(super) fn translated(html: &str) -> String {
+/// `found` has the French of [what the lines found](found), whose sentences are made of figures.
+pub(super) fn translated(html: &str, found: &HashMap<String, String>) -> String {
     let mut text = String::with_capacity(html.len() + html.len() / 8);
     for part in parts(html) {
         match part {
             Part::Tag(tag) => text.push_str(tag),
             Part::Ours(said) => {
                 let plain = unescaped(said);
-                match french(&plain) {
+                let told = found.get(&*plain).map(|told| Cow::from(told.as_str()));
+                match told.or_else(|| french(&plain)) {
                     Some(french) => text.push_str(&escaped(&spaced(&french))),
                     None => text.push_str(said),
                 }
@@ -38,14 +42,28 @@ pub(super) fn translated(html: &str) -> String {
     text.replacen("<html lang=\"en\">", "<html lang=\"fr\">", 1)
 }
 
+/// What lines found wrong with themselves, as the report says it and in French.
+pub(super) fn found<'a>(lines: impl IntoIterator<Item = &'a LineDetailView>) -> HashMap<String, String> {
+    let mut all = HashMap::new();
+    for told in lines.into_iter().flat_map(|detail| &detail.line.findings) {
+        let Some(french) = page::finding(told) else { continue };
+        all.insert(told.text.clone(), french.text);
+        all.extend(told.next.iter().cloned().zip(french.next.into_iter().map(str::to_owned)));
+        if let (Some(what), Some(alike)) = (&told.cannot_be_told_from, french.alike) {
+            all.insert(cannot_be_told_from(what), alike);
+        }
+    }
+    all
+}
+
 /// What of a document is the program's own and has no French words: nothing, in a document of known parts.
 #[cfg(test)]
-pub(super) fn untranslated(html: &str) -> Vec<String> {
+pub(super) fn untranslated(html: &str, found: &HashMap<String, String>) -> Vec<String> {
     let ours = parts(html).filter_map(|part| match part {
         Part::Ours(said) if !said.is_empty() => Some(unescaped(said).into_owned()),
         _ => None,
     });
-    ours.filter(|said| french(said).is_none()).collect()
+    ours.filter(|said| !found.contains_key(said) && french(said).is_none()).collect()
 }
 
 /// A tag, or what stands between two of them.
