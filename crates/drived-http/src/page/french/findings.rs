@@ -123,7 +123,7 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
 mod tests {
     use std::time::Duration;
 
-    use drive_bus::{Alike, Certainty, Defect, Finding};
+    use drive_bus::evidence::{Alike, Certainty, Defect, Finding};
 
     use super::*;
 

@@ -21,7 +21,7 @@ pub use self::{
     command::{CommandView, SeveralView},
     drive::{DriveView, Gist, Shown},
     exchange::{ExchangeView, LineDetailView, ResultWord},
-    line::{AnswerTimes, LineErrors, LineLink, LineView, SlaveView},
+    line::{AnswerTimes, FindingView, LineErrors, LineLink, LineView, SlaveView},
     measured::{AnswersView, MeasuredLineView, PlannedLineView, SettingsView, StepView, TimesView},
     notice::{HappenedView, NoticeView},
 };

@@ -41,10 +41,18 @@ fn rows(days: &[DayView]) -> Vec<(String, Markup)> {
         "tripped",
         match trips.is_empty() {
             true => cell("0"),
-            false => html! { @for (cause, times) in trips { (times) " × " (cause) br; } },
+            false => html! { @for (cause, times) in trips { (times) " × " (self::cause(cause)) br; } },
         },
     );
     rows
+}
+
+/// What a drive tripped by, such as `9 OCF: overcurrent`.
+fn cause(told: &str) -> Markup {
+    match told.split_once(": ") {
+        Some((code, meaning)) => html! { (code) ": " (own(meaning)) },
+        None => own(told),
+    }
 }
 
 /// The energy of the days: of one source, for counts and kilowatt-hours are two things.

@@ -3,13 +3,16 @@
 use std::{collections::BTreeSet, time::Duration};
 
 use chrono::Local;
-use drive_bus::{Line, LineConfig};
+use drive_bus::{
+    Line, LineConfig,
+    evidence::{Alike, Certainty, Defect, Finding},
+};
 use drive_core::{
     Identity, SlaveAddress,
     serial::{CharacterFormat, SerialSettings},
 };
 use drive_families::{Family, SetUp, simulated};
-use drive_fleet::{IdentityCheck, Periods, WatchdogCheck};
+use drive_fleet::{IdentityCheck, Periods, WatchdogCheck, view::FindingFigures};
 use drive_sim::{SimLine, SimSlave, Wiring};
 
 use super::{
@@ -19,7 +22,7 @@ use super::{
 };
 use crate::commands::param::diff::Cell;
 use drived_config::config::LinePart;
-use drived_plant::plant::views::LineLink;
+use drived_plant::plant::views::{FindingView, LineLink};
 use drived_words::drive_spec::DriveName;
 
 /// The functions that write (Modbus Application Protocol V1.1b3, section 6).
@@ -256,8 +259,9 @@ async fn what_the_history_kept_of_the_last_days_is_told_of_each_drive_and_nothin
         "2.5 kWh summed up from its power",
         "50 %",
         "7.2 A",
-        "3 × 9 OCF: overcurrent",
-        "1 × 16 OHF",
+        "3 × 9 OCF: ",
+        "overcurrent",
+        "1 × 16 OHF: ",
     ] {
         assert!(told.contains(expected), "{expected}: {told}");
     }
@@ -266,27 +270,22 @@ async fn what_the_history_kept_of_the_last_days_is_told_of_each_drive_and_nothin
 }
 
 /// What a line may find wrong with itself, as the API tells it.
-fn found_wrong() -> Vec<drived_plant::plant::views::FindingView> {
-    let found = |finding: &drive_bus::Finding, told_from: Option<&str>| {
+fn found_wrong() -> Vec<FindingView> {
+    let found = |finding: &Finding, told_from: Option<&str>| {
         let mut told = serde_json::json!({
             "defect": finding.defect.name(), "slave": finding.slave, "cannot_be_told_from": told_from,
             "text": finding.to_string(), "next": finding.next(),
         });
-        let figures = serde_json::to_value(drive_fleet::view::FindingFigures::from(finding)).unwrap();
+        let figures = serde_json::to_value(FindingFigures::from(finding)).unwrap();
         told.as_object_mut().unwrap().extend(figures.as_object().unwrap().clone());
         serde_json::from_value(told).unwrap()
     };
-    let (refuses, two) = (drive_bus::Defect::RefusesAll(2), drive_bus::Defect::TwoAtOneAddress);
-    let old = drive_bus::Alike::OldAnswers;
-    let certainty = drive_bus::Certainty::CannotBeToldFrom(old);
-    let refuses = drive_bus::Finding {
-        defect: refuses,
-        slave: Some(9),
-        share: (5, 5),
-        certainty: drive_bus::Certainty::Certain,
-    };
-    let two = drive_bus::Finding { defect: two, slave: Some(1), share: (4, 7), certainty };
-    vec![found(&refuses, None), found(&two, Some(&old.to_string()))]
+    let finding = |slave, defect, share, certainty| Finding { slave: Some(slave), defect, share, certainty };
+    let two = Certainty::CannotBeToldFrom(Alike::OldAnswers);
+    vec![
+        found(&finding(9, Defect::RefusesAll(2), (5, 5), Certainty::Certain), None),
+        found(&finding(1, Defect::TwoAtOneAddress, (4, 7), two), Some(&Alike::OldAnswers.to_string())),
+    ]
 }
 
 #[tokio::test(start_paused = true)]
