@@ -134,6 +134,12 @@ pub trait Machine: Send {
         pdu::is_write(request)
     }
 
+    /// Whether the confirmation of an earlier write may still come when another one is sent, and be taken for its own where it names no
+    /// value.
+    fn confirms_late(&self) -> bool {
+        true
+    }
+
     /// Whether the far end takes the time that characters take on the line, so that what comes sooner is no answer.
     fn set_far_end_paces(&mut self, paces: bool) {
         let _ = paces;

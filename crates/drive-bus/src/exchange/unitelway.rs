@@ -92,6 +92,11 @@ impl Machine for UniTelway {
         encode(request).map_or_else(|_| crate::pdu::is_write(request), |unite| unite.is_write())
     }
 
+    /// A slave says nothing that it is not polled for, and what it still had to say is polled first.
+    fn confirms_late(&self) -> bool {
+        false
+    }
+
     fn start(&mut self, slave: u8, request: Arc<Request<'static>>, _: &Bytes) -> Bytes {
         self.open(slave, request, drive_unitelway::UniTelway::start)
     }

@@ -226,11 +226,12 @@ impl<C> Master<C> {
         };
         let is_write = self.exchange.is_write(&request);
         let first = crate::mutant!("first-answer-believed", self.fresh.is_first(), false);
-        let wrote = is_write.then(|| Frame::of(pdu).check);
+        let check = is_write.then(|| Frame::of(pdu).check);
+        let wrote = check.filter(|_| self.exchange.confirms_late());
         let doubt = &mut self.station(slave).doubt;
         let suspect = first || doubt.owes(now, shape, wrote);
-        if let Some(wrote) = wrote {
-            doubt.written(shape, wrote);
+        if let Some(check) = check {
+            doubt.written(shape, check);
         }
         let answer = answer::likely_len(&request);
         self.longest = (self.longest.0.max(pdu.len()), self.longest.1.max(answer));
