@@ -165,8 +165,10 @@ mod tests {
     #[test]
     fn of_a_word_that_has_bits_each_counts_and_one_that_is_a_value_has_that_beside_it() {
         // BBV51701: ETA 3201 is the status word; RFR 3202 the output frequency in 0.1 Hz.
-        let word =
-            |address: u16, value: u16| json!({"status": {"raw": [{"address": address, "value": value}]}});
+        let word = |address: u16, value: u16| {
+            let code = rows().iter().find(|row| row.address == address).map(|row| row.code);
+            json!({"status": {"raw": [{"address": address, "code": code, "value": value}]}})
+        };
         assert_eq!(news(0, &word(3_201, 0x0637), &word(3_201, 0x0233), rows()), News::Something);
         assert_eq!(news(0, &word(3_202, 300), &word(3_202, 301), rows()), News::Little);
     }
