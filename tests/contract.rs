@@ -94,7 +94,7 @@ async fn the_contract_complains_of_every_family_that_breaks_it() {
     for family in Family::BUILT_IN {
         for mutant in Mutant::ALL {
             let shows = !CANNOT_SHOW.contains(&(family, mutant));
-            if shows && mutant.of(contract(family)).complaints().await.is_empty() {
+            if shows && !mutant.of(contract(family)).complains().await {
                 unseen.push(format!("{family}: {mutant:?}"));
             }
         }

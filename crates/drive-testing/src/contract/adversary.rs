@@ -111,7 +111,15 @@ impl Contract {
         all
     }
 
-    /// The same, for a test.
+    /// Whether there is any, found as soon as it can be: for families that are broken on purpose.
+    pub async fn complains(&self) -> bool {
+        !self.obeyed().await.is_empty()
+            || !self.disobeyed().await.is_empty()
+            || !self.with_lost_answers().await.is_empty()
+            || !self.proves_what_it_says().await.is_empty()
+    }
+
+    /// What [`complaints`](Self::complaints) finds, for a test.
     ///
     /// # Panics
     /// With the complaints, when there are any.

@@ -96,10 +96,10 @@ fn settings(family: Family) -> &'static [(u16, u16)] {
     }
 }
 
-/// Of so many cuts one is followed by the next run: `DRIVED_ONE_IN`, 1 for all of them.
+/// Of so many cuts one is followed by the next run: `DRIVED_CUTS_ONE_IN`, 1 for all of them.
 fn one_in() -> u64 {
-    let given = std::env::var("DRIVED_ONE_IN").map_or(Ok(8), |one_in| one_in.parse());
-    given.expect("DRIVED_ONE_IN is a number")
+    let given = std::env::var("DRIVED_CUTS_ONE_IN").map_or(Ok(8), |one_in| one_in.parse());
+    given.expect("DRIVED_CUTS_ONE_IN is a number")
 }
 
 /// Which register the manual wants before which other one.
