@@ -74,7 +74,7 @@ impl<P: Port> Drive3g3ev<P> {
             };
             let output = status.raw(address::OUTPUT_FREQUENCY);
             let directed = status.direction == Some(direction) || output < first;
-            if because.is_none() && is_run(&status) && directed {
+            if because.is_none() && is_run(&status) && directed && !self.is_brought_down(&status) {
                 let verdict = self.verdict(&status);
                 return Ok(Status { verdict, ..status });
             }

@@ -129,6 +129,17 @@ impl<P: Port> Drive3g3ev<P> {
         status.verdict = self.watch.run.judge(&evidence);
     }
 
+    /// Whether the motor slows down below its reference: RUN stands in a drive that a STOP at its panel brings to rest.
+    pub(crate) fn is_brought_down(&self, status: &Status) -> bool {
+        // In percent too: both are told in the same unit.
+        let of = |at| status.raw(at).map(|counts| Frequency::from_centihertz(counts.into()));
+        let both = of(address::OUTPUT_FREQUENCY).zip(of(address::REFERENCE_SEEN));
+        is_run(status)
+            && both.is_some_and(|(output, reference)| {
+                self.watch.is_brought_down(status.direction, output, reference)
+            })
+    }
+
     fn evidence(&self, status: &Status) -> Evidence {
         let is_run = |word| Command::from_bits_retain(word).contains(Command::RUN);
         let state = state_word(status);
@@ -136,7 +147,7 @@ impl<P: Port> Drive3g3ev<P> {
         Evidence {
             word: self.watch.run.word(is_run),
             command: Told::unless(local),
-            output: Told::unless(withheld(status)),
+            output: if self.is_brought_down(status) { Told::NotTold } else { Told::unless(withheld(status)) },
             reference: self.reference_told(status, state),
         }
     }

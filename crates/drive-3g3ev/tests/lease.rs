@@ -133,6 +133,22 @@ async fn a_panel_that_takes_control_is_told_with_the_next_status() {
     stays_still(&mut drive, &machine).await;
 }
 
+/// RUN of 0020h and 002Ch may stand for as long as the motor turns, and no word names a STOP at the panel (§5.2).
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_a_stop_at_the_panel_brings_down_is_not_told_in_force() {
+    let (mut drive, machine, _rig) = started().await;
+    machine.panel(Panel::Stop);
+    let mut looks = 0;
+    while machine.observe().running {
+        let verdict = drive.status().await.unwrap().verdict;
+        assert!(verdict.is_some_and(|verdict| !verdict.is_in_force()), "{verdict:?}");
+        sleep(TENTH).await;
+        looks += 1;
+    }
+    assert!(looks > 3);
+    assert_eq!(lost(&mut drive, 1).await.0, Lack::Output);
+}
+
 #[tokio::test(start_paused = true)]
 async fn an_output_that_an_input_cuts_is_told_while_it_lasts_and_the_motor_coasts() {
     let (mut drive, machine, _rig) = started().await;

@@ -303,9 +303,13 @@ impl<P: Port> Atv21<P> {
         Err(self.not_confirmed(Command::Stop(asked), status, because))
     }
 
-    /// The status, and after all that it shows FA00.
+    /// The status, and after all that it shows FA00. FD01 is read before FE45: where another commands, who may have taken the motor
+    /// between the two and runs it, all is read again.
     async fn status_and_command_word(&mut self) -> Result<(Status, CommandWord)> {
-        let status = self.read_status(Class::Command).await?;
+        let mut status = self.read_status(Class::Command).await?;
+        if commanded_by_other(&status).is_some() && !status_word(&status).contains(StatusWord::RUN) {
+            status = self.read_status(Class::Command).await?;
+        }
         Ok((status, self.command_word(Class::Command).await?))
     }
 

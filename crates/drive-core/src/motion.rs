@@ -22,8 +22,8 @@ pub enum Motion {
     /// The output was cut while it turned, or was not there when it was first looked at, and nothing tells when it has come to rest.
     Coasting,
     /// The drive brought it down to no output, or watches the shaft itself and says that it stands, or its coast time is over. What it
-    /// did between two looks, or while its line was lost, nobody saw: a motor that was at rest, and that others have run and let coast
-    /// meanwhile, is told to be at rest still.
+    /// did between two looks nobody saw: a motor that was at rest, and that others have run and let coast meanwhile, is told to be at
+    /// rest still. Behind a lost line it is not: nobody knows for how long it was not looked at.
     AtRest,
     /// The words do not tell.
     #[default]
@@ -65,8 +65,8 @@ pub enum Output {
     Injection,
     /// There is no output, and the drive has not cut it by itself: a ramp has ended.
     None,
-    /// There is no output any more, of a motor that a stop brought down in whose place another may stand by now: only how fast it
-    /// came down tells a ramp that has ended from a cut.
+    /// There is no output any more, of a motor that a stop brought down in whose place another may stand by now: only that it had
+    /// the time to come down as fast as it was seen to tells a ramp that has ended from a cut.
     Gone,
     /// The output is cut: freewheel, a blocked output, no mains.
     Cut,
@@ -85,6 +85,10 @@ pub const INJECTION_TIME: Duration = Duration::from_secs(5);
 /// How long direct current is held at the most: longer heats a motor that stands. An Altivar 312 takes no longer time for it
 /// either (`tdC`, BBV51701 p. 41).
 pub const INJECTION_AT_MOST: Duration = Duration::from_secs(30);
+
+/// What two readings of an output leave open of its ramp, in hundredths of a hertz: they are rounded, and their moments are those of
+/// answers.
+const ROUNDING: u32 = 50;
 
 /// What was last seen of the shaft, or is to be taken for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -110,11 +114,15 @@ struct Descent {
     last: Option<(Instant, u32)>,
     /// Hundredths of a hertz in a time.
     rate: Option<(u32, Duration)>,
+    /// The last look showed less than the one before it.
+    falls: bool,
 }
 
 impl Descent {
     fn see(&mut self, now: Instant, output: u32) {
+        self.falls = false;
         if let Some((then, before)) = self.last {
+            self.falls = output < before;
             if output > before {
                 self.rate = None;
             } else if output < before && now > then {
@@ -124,16 +132,24 @@ impl Descent {
         self.last = Some((now, output));
     }
 
-    /// Whether an output that is gone at `now` cannot have come down so fast: it was cut.
+    /// Whether an output that is gone at `now` cannot have come down so fast: it was cut, whatever the drive says.
     fn is_cut(&self, now: Instant) -> bool {
-        let (Some((then, output)), Some((counts, time))) = (self.last, self.rate) else { return false };
-        let needed = time * output / counts.max(1);
-        now.saturating_duration_since(then) * 2 < needed
+        self.until(now, 0).is_some_and(|(passed, needed)| passed * 2 < needed)
+    }
+
+    /// Whether an output that is gone at `now` had the time to come down as fast as it was seen to.
+    fn has_come_down(&self, now: Instant) -> bool {
+        self.until(now, ROUNDING).is_some_and(|(passed, needed)| passed >= needed)
+    }
+
+    /// How long ago it was last seen, and how long it takes from there down to an output of `end`, by how fast it came down.
+    fn until(&self, now: Instant, end: u32) -> Option<(Duration, Duration)> {
+        let ((then, output), (counts, time)) = self.last.zip(self.rate)?;
+        Some((now.saturating_duration_since(then), time * output.saturating_sub(end) / counts.max(1)))
     }
 }
 
-/// The shaft behind the output, from status to status. Pure: time is an argument. It is not forgotten when a line is lost: a
-/// motor that turned then may coast when the line is back.
+/// The shaft behind the output, from status to status. Pure: time is an argument.
 ///
 /// ```
 /// use std::time::Duration;
@@ -159,8 +175,6 @@ pub struct Shaft {
     coast_time: Option<Duration>,
     /// How long an injection takes to bring it to rest, where its owner says so.
     injection_time: Option<Duration>,
-    /// The line was lost since it was last seen.
-    was_lost: bool,
 }
 
 impl Default for Shaft {
@@ -175,11 +189,10 @@ impl Shaft {
     pub const fn new() -> Self {
         Self {
             past: Past::Unseen,
-            descent: Descent { last: None, rate: None },
+            descent: Descent { last: None, rate: None, falls: false },
             injected_since: None,
             coast_time: None,
             injection_time: None,
-            was_lost: false,
         }
     }
 
@@ -201,9 +214,10 @@ impl Shaft {
         self.injection_time.unwrap_or(INJECTION_TIME).min(INJECTION_AT_MOST)
     }
 
-    /// The line was lost: what the drive does meanwhile nobody sees, and a motor that turned may have been cut.
-    pub const fn lose_sight(&mut self) {
-        self.was_lost = true;
+    /// The line was lost: what the drive does meanwhile nobody sees, for however long. What turned may have been cut, and what stood may
+    /// have been run by others and let coast: it is as one that was never seen.
+    pub fn lose_sight(&mut self) {
+        *self = Self { coast_time: self.coast_time, injection_time: self.injection_time, ..Self::new() };
     }
 
     /// A motor that was seen at rest may have turned since, by what was seen of it besides a status, or not seen at all: without an
@@ -220,26 +234,34 @@ impl Shaft {
         matches!(self.past, Past::Braked { .. })
     }
 
+    /// Whether the last status showed the output going down, from the one before it: no obedience to a reference above it.
+    #[must_use]
+    pub const fn falls(&self) -> bool {
+        self.descent.falls
+    }
+
     /// What a status shows at `at`, with the output frequency that the drive tells.
     pub fn see(&mut self, at: Instant, shown: Output, frequency: Option<Frequency>) -> Motion {
+        if shown == Output::NotKnown {
+            // The next look goes on from the one before.
+            return Motion::NotKnown;
+        }
         let turns = frequency.is_some_and(|frequency| frequency != Frequency::ZERO);
-        let was_lost = std::mem::take(&mut self.was_lost);
         let mut descent = std::mem::take(&mut self.descent);
-        let is_cut = was_lost || self.was_braked() && descent.is_cut(at);
         let shown = match shown {
             Output::Tripped => Output::Cut,
-            Output::None if is_cut => Output::Cut,
-            Output::Gone if is_cut || descent.rate.is_none() => Output::Cut,
-            Output::Gone => Output::None,
+            Output::None if self.was_braked() && descent.is_cut(at) => Output::Cut,
+            Output::Gone if descent.has_come_down(at) => Output::None,
+            Output::Gone => Output::Cut,
             shown => shown,
         };
-        if shown != Output::NotKnown && shown != Output::Injection {
+        if shown != Output::Injection {
             self.end_injection(at, matches!(shown, Output::Driven | Output::Braking(_)));
         }
         match shown {
             Output::NotKnown => Motion::NotKnown,
             Output::Driven if frequency == Some(Frequency::ZERO) => {
-                self.past = self.at_zero(at, descent, was_lost);
+                self.past = self.at_zero(at, descent);
                 Motion::Driven
             }
             Output::Driven => {
@@ -292,10 +314,10 @@ impl Shaft {
 
     /// A run command acts, at no output. It stands where it stood, or was seen to come down so far; else it may coast below a run
     /// command that was given to it since, as after a stop of one moment.
-    fn at_zero(&self, at: Instant, descent: Descent, was_lost: bool) -> Past {
-        let came_down = !was_lost && descent.rate.is_some() && !descent.is_cut(at);
+    fn at_zero(&self, at: Instant, descent: Descent) -> Past {
+        let came_down = descent.rate.is_some() && !descent.is_cut(at);
         match self.past {
-            Past::Driven { zero: true, .. } if !was_lost => Past::Driven { zero: true, still: true },
+            Past::Driven { zero: true, .. } => Past::Driven { zero: true, still: true },
             Past::AtRest | Past::Braked { still: true } => Past::Driven { zero: true, still: false },
             Past::Driven { .. } | Past::Braked { .. } if came_down => {
                 Past::Driven { zero: true, still: false }
@@ -457,7 +479,12 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn an_output_that_is_gone_sooner_than_its_ramp_brings_it_down_was_cut() {
-        for (last, motion) in [(200, Motion::Coasting), (1_500, Motion::AtRest)] {
+        for (last, said_to_be_over, not_said) in [
+            (200, Motion::Coasting, Motion::Coasting),
+            // More than half of the time: the drive may have come down faster in the end, if it says that its ramp is over.
+            (1_000, Motion::AtRest, Motion::Coasting),
+            (1_800, Motion::AtRest, Motion::AtRest),
+        ] {
             let (mut shaft, begun) = (Shaft::new(), Instant::now());
             let after = |milliseconds| begun + Duration::from_millis(milliseconds);
             for (at, hertz) in [(0, 20), (100, 19), (200, 18)] {
@@ -469,8 +496,9 @@ mod tests {
             }
             // 18 Hz at 10 Hz/s take 1.8 s.
             let mut other = shaft;
-            assert_eq!(shaft.see(after(200 + last), Output::None, Some(Frequency::ZERO)), motion, "{last}");
-            assert_eq!(other.see(after(200 + last), Output::Gone, Some(Frequency::ZERO)), motion, "{last}");
+            let at = after(200 + last);
+            assert_eq!(shaft.see(at, Output::None, Some(Frequency::ZERO)), said_to_be_over, "{last}");
+            assert_eq!(other.see(at, Output::Gone, Some(Frequency::ZERO)), not_said, "{last}");
         }
     }
 
@@ -486,16 +514,48 @@ mod tests {
         assert_eq!(resting(now).see(now, Output::Gone, Some(Frequency::ZERO)), Motion::AtRest);
     }
 
+    /// What stood as well: its panel may have run it and let it coast, for however long it was not looked at. So it is at the first look
+    /// of a program.
     #[tokio::test(start_paused = true)]
-    async fn a_motor_that_came_down_when_the_line_was_lost_may_have_been_cut_meanwhile() {
-        let (mut shaft, now) = (Shaft::new(), Instant::now());
-        shaft.see(now, Output::Braking(Frequency::from_hertz(30)), None);
-        shaft.lose_sight();
-        assert_eq!(shaft.see(now, Output::None, Some(Frequency::ZERO)), Motion::Coasting);
-        // One that stood is not set in motion by a lost line.
-        let mut resting = resting(now);
-        resting.lose_sight();
-        assert_eq!(resting.see(now, Output::None, Some(Frequency::ZERO)), Motion::AtRest);
+    async fn behind_a_lost_line_a_motor_may_coast_whatever_was_seen_of_it_until_its_coast_time_is_over() {
+        let (begun, zero) = (Instant::now(), Some(Frequency::ZERO));
+        let three = Frequency::from_hertz(3);
+        let ways: [(&str, &[Output]); 5] = [
+            ("at rest", &[Output::Stands]),
+            ("braked", &[Output::Braking(three)]),
+            ("braked to no output", &[Output::Braking(three), Output::Braking(Frequency::ZERO)]),
+            ("driven at no output", &[Output::Stands, Output::Driven, Output::Driven]),
+            ("let coast long ago", &[Output::Cut]),
+        ];
+        for (what, ways) in ways {
+            let mut shaft = Shaft::new();
+            shaft.set_coast_time(Some(Duration::from_secs(20)));
+            for shown in ways {
+                let output = if let Output::Braking(output) = *shown { output } else { Frequency::ZERO };
+                shaft.see(begun, *shown, Some(output));
+            }
+            shaft.lose_sight();
+            let back = begun + Duration::from_secs(60);
+            assert_eq!(shaft.see(back, Output::NotKnown, None), Motion::NotKnown);
+            for shown in [Output::None, Output::Gone, Output::Cut] {
+                let mut shaft = shaft;
+                assert_eq!(shaft.see(back, shown, zero), Motion::Coasting, "{what}: {shown:?}");
+                let later = back + Duration::from_secs(20);
+                assert_eq!(shaft.see(later, shown, zero), Motion::AtRest, "{what}: {shown:?}");
+            }
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_look_that_does_not_tell_leaves_how_fast_the_motor_came_down() {
+        let (mut shaft, begun) = (Shaft::new(), Instant::now());
+        let after = |milliseconds| begun + Duration::from_millis(milliseconds);
+        for (at, hertz) in [(0, 20), (100, 19)] {
+            shaft.see(after(at), Output::Braking(Frequency::from_hertz(hertz)), None);
+        }
+        assert_eq!(shaft.see(after(200), Output::NotKnown, None), Motion::NotKnown);
+        // 19 Hz at 10 Hz/s take 1.9 s.
+        assert_eq!(shaft.see(after(300), Output::None, Some(Frequency::ZERO)), Motion::Coasting);
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::{
     lease::{Ground, Lease},
     motion::{Motion, Output, Shaft},
     own_run::OwnRun,
+    setpoint::Direction,
     turns::Turns,
     units::Frequency,
 };
@@ -56,6 +57,21 @@ impl Watch {
         self.shaft.see(at, shown, frequency)
     }
 
+    /// Whether the status that was [seen](Self::see) last shows a motor that slows down although its reference asks for more than its
+    /// `output`: by a stop that the drive does not name, or before it speeds up again. A run command that stands in a drive which runs is
+    /// not shown to be obeyed then. One that is turned round comes down first.
+    #[must_use]
+    pub fn is_brought_down(
+        &self,
+        direction: Option<Direction>,
+        output: Frequency,
+        reference: Frequency,
+    ) -> bool {
+        let turns_round =
+            self.run.lease().is_some_and(|lease| direction.is_some_and(|seen| seen != lease.direction));
+        self.shaft.falls() && output < reference && !turns_round
+    }
+
     /// Whether this side has armed the drive's communication watchdog.
     pub const fn set_armed(&mut self, armed: bool) {
         self.armed = armed;
@@ -98,7 +114,7 @@ impl Watch {
         self.settings.clear();
     }
 
-    /// The line was lost: what was read proves nothing any more. The run command stays, and so does what the shaft did.
+    /// The line was lost: what was read proves nothing any more, and the shaft is as one that was never seen. The run command stays.
     pub fn lose_sight(&mut self) {
         self.run.unread();
         self.shaft.lose_sight();
@@ -138,7 +154,6 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::setpoint::Direction;
 
     #[test]
     fn a_ground_is_told_once_when_it_is_found_otherwise_and_only_while_anything_rests_on_it() {
@@ -185,6 +200,23 @@ mod tests {
         watch.shaft.set_coast_time(Some(Duration::from_secs(9)));
         assert_eq!(watch.see(now + Duration::from_secs(9), Output::Tripped, zero), Motion::AtRest);
         assert_eq!(watch.see(now + Duration::from_secs(10), Output::Tripped, zero), Motion::AtRest);
+    }
+
+    /// A panel's STOP brings a motor down whose drive runs until it stands.
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_slows_down_below_its_reference_is_brought_down_unless_it_is_turned_round() {
+        let (begun, hertz) = (Instant::now(), Frequency::from_hertz);
+        let mut watch = Watch::default();
+        watch.run.give(Lease::new(Direction::Forward, 1));
+        for (at, output, forward, reverse) in
+            [(1, 20, false, false), (2, 30, false, false), (3, 25, true, false), (4, 25, false, false)]
+        {
+            watch.see(begun + Duration::from_secs(at), Output::Driven, Some(hertz(output)));
+            for (direction, told) in [(Direction::Forward, forward), (Direction::Reverse, reverse)] {
+                let is = |reference| watch.is_brought_down(Some(direction), hertz(output), hertz(reference));
+                assert_eq!((is(30), is(25)), (told, false), "{output} Hz, {direction}");
+            }
+        }
     }
 
     /// It was being brought down, the line was lost, and at the next look there is no output: by the ramp, or cut.

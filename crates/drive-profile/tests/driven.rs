@@ -617,6 +617,27 @@ async fn a_motor_that_turned_before_it_was_first_seen_is_not_told_at_rest() {
     }
 }
 
+/// `worlds --story 8.3.0.o5.l2.o8.e10.o1.l1` of `drive-fire`: told at rest at 6.7 Hz, behind more than half of the time that the ramp would
+/// have taken.
+#[tokio::test(start_paused = true)]
+async fn a_motor_whose_output_is_cut_in_a_ramp_is_not_told_at_rest_whether_or_not_its_supply_is_back() {
+    for comes_back in [false, true] {
+        let mut rig = running("v20").await;
+        rig.drive.stop(StopMode::Ramp).await.expect("it is seen to come down");
+        tokio::time::sleep(Duration::from_millis(400)).await;
+        assert_eq!(rig.drive.status().await.expect("it answers").motion, Motion::Braking);
+        rig.machine.motor_supply(false);
+        if comes_back {
+            rig.machine.motor_supply(true);
+        }
+        tokio::time::sleep(Duration::from_millis(600)).await;
+        let status = rig.drive.status().await.expect("it answers");
+        let seen = rig.machine.observe();
+        assert!(seen.shaft_frequency > 1_000 && !seen.running, "{seen:?}");
+        assert_eq!(status.motion, Motion::Coasting, "{comes_back}: {status}");
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_shaft_is_told_at_rest_by_what_its_file_names_for_that() {
     let told = "standstill = { register = \"ZSW\", mask = 0x4000, value = 0x4000, source = \"oi2012 wb\" }";

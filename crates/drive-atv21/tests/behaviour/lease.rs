@@ -1,6 +1,6 @@
 //! Our run command from the moment it is written until the drive shows that it stands no more. Pages are the manual's.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, time::Duration};
 
 use drive_atv21::{Atv21, CAPABILITIES, ROWS};
 use drive_core::{
@@ -134,6 +134,22 @@ async fn a_keypad_that_runs_it_at_45_hz_is_told_with_the_next_status() {
     let (lack, because) = lost(&mut drive, 1).await;
     assert_eq!(lack, Lack::Command);
     assert!(because.contains("keypad"), "{because}");
+}
+
+/// LOC/REM is always active (6.2 p. 12), and nothing says that it stops the motor: FD01 is read before FE45, and who takes control between
+/// the two runs on a motor that did not run by then.
+#[tokio::test(start_paused = true)]
+async fn a_stop_is_not_confirmed_at_a_motor_that_the_keypad_takes_and_runs_on_amid_it() {
+    for milliseconds in (20..=100).step_by(10) {
+        let (rig, mut drive) = running().await;
+        rig.machine.reading("LOC", "runs-on").unwrap();
+        let (stopped, ()) = tokio::join!(drive.stop(StopMode::Ramp), async {
+            tokio::time::sleep(Duration::from_millis(milliseconds)).await;
+            rig.machine.panel(Panel::TakeControl);
+        });
+        assert!(rig.machine.observe().running && rig.machine.observe().local);
+        assert!(stopped.is_err(), "taken after {milliseconds} ms: {stopped:?}");
+    }
 }
 
 #[tokio::test(start_paused = true)]

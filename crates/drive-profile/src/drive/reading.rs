@@ -69,7 +69,8 @@ impl<P: Port> ProfileDrive<P> {
             }
         }
         let shown = self.shown(&status, &words);
-        status.motion = self.watch.see(Instant::now(), shown, status.output_frequency);
+        let at = status.at.unwrap_or_else(Instant::now);
+        status.motion = self.watch.see(at, shown, status.output_frequency);
         let evidence = self.evidence(&status, &words);
         status.verdict = self.watch.run.verdict(&evidence);
         Ok((status, words))
@@ -211,6 +212,8 @@ impl<P: Port> ProfileDrive<P> {
                 _ if status.current.is_some_and(|current| current > Current::from_deciamperes(0)) => {
                     Output::NotKnown
                 }
+                // A drive that is not ready lacks its supply, or is held off: no ramp of a stop ends there.
+                _ if status.state == State::NotReady => Output::Cut,
                 // Behind a stop of this side another may stand by now.
                 _ if self.watch.shaft.was_braked() && !self.lets_coast => Output::Gone,
                 _ => Output::Cut,
@@ -246,7 +249,11 @@ impl<P: Port> ProfileDrive<P> {
             Some(_) => self.watch.run.word(|word| self.is_run(word)),
             None => RunWord::NotTold,
         };
-        Evidence { word, command, output: Told::unless(withheld(status)), reference }
+        let both = status.output_frequency.zip(status.reference);
+        let is_brought_down = status.state == State::Running
+            && both.is_some_and(|(output, of)| self.watch.is_brought_down(status.direction, output, of));
+        let output = if is_brought_down { Told::NotTold } else { Told::unless(withheld(status)) };
+        Evidence { word, command, output, reference }
     }
 
     /// Who has command or reference instead of the bus, where the drive tells it.
