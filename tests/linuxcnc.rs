@@ -12,8 +12,8 @@ use std::{
 
 use drive_core::SerialSettings;
 use drive_families::{Family, SetUp};
-use drive_profile::{definition, shipped};
-use drive_sim::{Observation, Serving, SimLine, SimSlave, Wiring};
+use drive_profile::{definition, digest, read, shipped};
+use drive_sim::{Observation, Panel, Serving, SimLine, SimSlave, Wiring};
 use drive_testing::peers::{is_there, runs};
 use tokio::{
     io::{AsyncBufReadExt as _, AsyncWriteExt as _, BufReader, Lines},
@@ -53,8 +53,8 @@ async fn linuxcnc_runs_turns_round_stops_and_resets_a_simulated_wj200() {
     hal.end().await;
 }
 
-/// It sets bit 6 of each command, the second ramp, which the profile does not use. `gs2_vfd` and `vfdb_vfd` have no twin here: they are for a
-/// GS2, of which thirteen words stand in a row at 2100h, and for a VFD-B, whose states at 2101h are others than an MS300's.
+/// It sets bit 6 of each command, the second ramp, which the profile does not use. `vfdb_vfd` has no twin here: it is for a VFD-B, whose
+/// states at 2101h are others than an MS300's, and its stop is a 0, which on that map is no function.
 #[tokio::test(flavor = "multi_thread")]
 async fn linuxcnc_runs_turns_round_stops_and_resets_a_simulated_vf_s15() {
     let Some(folder) = folder() else { return };
@@ -79,7 +79,7 @@ async fn linuxcnc_runs_turns_round_stops_and_resets_a_simulated_vf_s15() {
     hal.set(&pin("spindle-on"), "0").await;
     bench.until("rest", |seen| !seen.running && seen.shaft_frequency == 0).await;
     hal.until(&pin("is-stopped"), "TRUE").await;
-    hal.set(&pin("spindle-fwd"), "1").await;
+    // Still in reverse: the word of its reset has the bit of the direction, which takes nothing from it.
     bench.machine.trip(9);
     hal.until(&pin("trip-code"), "9").await;
     hal.set(&pin("err-reset"), "1").await;
@@ -88,6 +88,102 @@ async fn linuxcnc_runs_turns_round_stops_and_resets_a_simulated_vf_s15() {
     hal.until(&pin("trip-code"), "0").await;
     hal.end().await;
     let _ = std::fs::remove_file(ini);
+}
+
+/// Run, direction and reset in registers of their own, the frequency in tenths of a hertz. It reads thirteen words in a row at 2100h, of which
+/// the GS4 has fewer: the twin gets the others, as a GS2 has them. It counts on a direction that acts while the motor runs.
+#[tokio::test(flavor = "multi_thread")]
+async fn linuxcnc_runs_turns_round_stops_and_resets_a_simulated_gs2() {
+    let Some(folder) = folder() else { return };
+    let others: String = [0x2100, 0x2104, 0x2105, 0x2106, 0x2107, 0x2108, 0x2109, 0x210A, 0x210B, 0x210C]
+        .map(|address| {
+            format!("[register.W{address:04X}]\nwhat = \"another\"\naddress = {address}\naccess = \"read\"\nsource = \"linuxcnc\"\n\n")
+        })
+        .concat();
+    let bench = Bench::of_text(
+        "gs4",
+        "9600 8N1",
+        &[
+            ("read_words = \"unknown\"", "read_words = 13"),
+            ("reads_across = \"unknown\"", "reads_across = true"),
+            ("acts = \"unknown\"", "acts = \"level\""),
+            ("[state]\n", &format!("{others}[state]\n")),
+        ],
+    );
+    let load = format!("loadusr -W gs2_vfd --device {} --rate 9600 --parity none", bench.port.display());
+    let mut hal = Hal::start(&folder, &load).await;
+    let pin = |name: &str| format!("gs2_vfd.{name}");
+    // 1800 rpm at 60 Hz, as it takes a motor for.
+    hal.set(&pin("speed-command"), "900").await;
+    hal.set(&pin("spindle-fwd"), "1").await;
+    hal.set(&pin("spindle-on"), "1").await;
+    bench.until("30 Hz forward", |seen| seen.output_frequency == 3_000).await;
+    hal.until(&pin("at-speed"), "TRUE").await;
+    hal.set(&pin("spindle-fwd"), "0").await;
+    bench.until("30 Hz in reverse", |seen| seen.output_frequency == -3_000).await;
+    hal.set(&pin("speed-command"), "600").await;
+    bench.until("20 Hz in reverse", |seen| seen.output_frequency == -2_000).await;
+    hal.set(&pin("spindle-on"), "0").await;
+    bench.until("rest", |seen| !seen.running && seen.shaft_frequency == 0).await;
+    hal.until(&pin("is-stopped"), "TRUE").await;
+    bench.machine.trip(9);
+    hal.set(&pin("err-reset"), "1").await;
+    bench.until("the reset", |seen| seen.trip.is_none()).await;
+    assert!(!bench.machine.observe().running, "a reset is no start");
+    hal.end().await;
+}
+
+/// It writes the run command and the frequency again in each of its turns, forward alone, and reads one word at a time. What it gives and where
+/// it sees the output is not in the shipped profile, which is only stopped: the twin gets it from there.
+#[tokio::test(flavor = "multi_thread")]
+async fn linuxcnc_runs_and_stops_a_simulated_huanyang_gt() {
+    let Some(folder) = folder() else { return };
+    let read = [0x3002, 0x3003, 0x3004, 0x3005, 0x3006, 0x300A, 0x300B, 0x300C, 0x300D, 0x3010, 0x3014];
+    let others = read
+        .map(|address| {
+            format!("[register.W{address:04X}]\nwhat = \"another\"\naddress = {address}\naccess = \"read\"\nsource = \"repos\"\n\n")
+        })
+        .concat();
+    let speed = "[register.SPEED]\nwhat = \"frequency by the bus\"\naddress = 0x2000\naccess = \"read_write\"\nstorage = \"unknown\"\nunit = \"%\"\n\
+         scale = [1, 100]\nsource = \"repos\"\n\n[register.OUTPUT]\nwhat = \"output frequency\"\naddress = 0x3000\naccess = \"read\"\nunit = \"Hz\"\n\
+         scale = [1, 100]\nsource = \"repos\"\n\n";
+    let setpoint = "[setpoint]\nregister = \"SPEED\"\nfull_scale = \"owner\"\nlimits = { low = 0, high = 10000 }\n\
+         sign_is_direction = false\nsource = \"repos\"\n\n[start]\n";
+    let bench = Bench::of_text(
+        "huanyang-gt",
+        "38400 8N1",
+        &[
+            ("setpoint = \"unknown\"\nwatchdog", "watchdog"),
+            ("[state]\n", &format!("{speed}{others}[state]\n")),
+            ("output = \"unknown\"", "output = \"OUTPUT\""),
+            ("[start]\n", setpoint),
+            (
+                "forward = \"unknown\"",
+                "forward = { steps = [{ write = \"COMMAND\", words = [1] }], source = \"repos\" }",
+            ),
+        ],
+    );
+    let load = format!(
+        "loadusr -W hy_gt_vfd --device {} --rate 38400 --parity none --motor-max-speed 3000 --max-frequency 50 --min-frequency 1",
+        bench.port.display()
+    );
+    let mut hal = Hal::start(&folder, &load).await;
+    let pin = |name: &str| format!("hy_gt_vfd.{name}");
+    hal.set(&pin("speed-cmd"), "1800").await;
+    hal.set(&pin("spindle-on"), "1").await;
+    bench.until("30 Hz forward", |seen| seen.output_frequency == 3_000).await;
+    hal.until(&pin("freq-fb"), "30").await;
+    hal.set(&pin("speed-cmd"), "1200").await;
+    bench.until("20 Hz", |seen| seen.output_frequency == 2_000).await;
+    bench.machine.trip(9);
+    hal.until(&pin("fault-info"), "9").await;
+    bench.until("rest", |seen| !seen.running && seen.shaft_frequency == 0).await;
+    bench.machine.panel(Panel::Reset);
+    // It has never taken its run command back: what runs here is what it writes.
+    bench.until("20 Hz again", |seen| seen.output_frequency == 2_000).await;
+    hal.set(&pin("spindle-on"), "0").await;
+    bench.until("rest", |seen| !seen.running && seen.shaft_frequency == 0).await;
+    hal.end().await;
 }
 
 /// The folder of its packages.
@@ -106,8 +202,19 @@ struct Bench {
 
 impl Bench {
     fn of(key: &str, settings: &str) -> Self {
+        Self::of_text(key, settings, &[])
+    }
+
+    /// Of a shipped profile with some places otherwise.
+    fn of_text(key: &str, settings: &str, changes: &[(&str, &str)]) -> Self {
         let settings: SerialSettings = settings.parse().expect("it is a setting of a line");
-        let profile = shipped::find(key).expect("it is shipped").clone();
+        let is_it = |text: &&str| shipped::find(key).is_some_and(|found| digest(text) == found.digest());
+        let text = shipped::TEXTS.iter().map(|(_, text)| *text).find(is_it).expect("it is shipped");
+        let text = changes.iter().fold(text.to_owned(), |text, (place, by)| {
+            assert_eq!(text.matches(place).count(), 1, "{key}: {place}");
+            text.replace(place, by)
+        });
+        let profile = read(&text).unwrap_or_else(|refusals| panic!("{refusals}"));
         let family = Family::new(definition(&Arc::new(profile)));
         let line = SimLine::new(Wiring::rtu(settings));
         let machine = family.machine(SetUp::ForTheBus).expect("it has a twin");

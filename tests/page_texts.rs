@@ -53,6 +53,19 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
             }
         }
     }
+    let of_profiles = ["command", "guards", "reading", "setpoint"];
+    for file in of_profiles {
+        // What stands over two lines is one sentence.
+        let source = read(&format!("drive-profile/src/drive/{file}.rs"));
+        let source = source.replace("\\\n     ", "");
+        for before in ["by: \"", "remedy: \"", "Refusal::Settings(", "Refusal::OnlyAStartShows("] {
+            sentences.extend(source.split(before).skip(1).filter_map(|rest| {
+                let rest = rest.trim_start();
+                let rest = if before.ends_with('"') { rest } else { rest.strip_prefix('"')? };
+                rest.split_once('"').map(|(text, _)| text.to_owned())
+            }));
+        }
+    }
     // Those that stand in tables of pairs.
     let in_pairs = read("drive-atv21/src/control.rs");
     // Its macro puts texts together that begin or end with a blank, for the inputs by name.
@@ -82,6 +95,34 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
     refusals.extend([Refusal::EepromLife, Refusal::MotorRunning]);
     sentences.extend(refusals.iter().map(ToString::to_string));
     assert!(sentences.len() > 70, "only {} sentences were found", sentences.len());
+    let missing: Vec<String> =
+        sentences.into_iter().filter(|sentence| !french.contains(&format!("  '{sentence}': '"))).collect();
+    assert!(missing.is_empty(), "no French for: {missing:#?}");
+}
+
+/// What the ladder of profiles says to whoever commands a drive.
+#[test]
+fn what_a_file_cannot_tell_of_a_drive_stands_in_french_on_the_page() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/");
+    let read = |path: &str| std::fs::read_to_string(format!("{root}{path}")).expect("it is read");
+    let french = read("drived-http/src/page/web/sentences_fr.js").replace("\\'", "'");
+    let ladder = read("drive-profile/src/ladder.rs");
+    let said = ladder.split("self.warn(").skip(1).filter_map(|rest| {
+        let rest = rest.trim_start().trim_start_matches("&format!(").trim_start_matches('"');
+        rest.split_once('"').map(|(text, _)| text)
+    });
+    let whose = ["who commands it", "who gives its reference"];
+    let mut sentences: Vec<String> =
+        said.flat_map(|text| whose.map(|whose| text.replace("{what}", whose))).collect();
+    // And what the shipped ones come to say by it.
+    sentences.extend(
+        drive_profile::shipped::all()
+            .iter()
+            .flat_map(|profile| profile.not_known().map(str::to_owned).collect::<Vec<_>>()),
+    );
+    sentences.sort();
+    sentences.dedup();
+    assert!(sentences.len() >= 13, "only {sentences:#?} were found");
     let missing: Vec<String> =
         sentences.into_iter().filter(|sentence| !french.contains(&format!("  '{sentence}': '"))).collect();
     assert!(missing.is_empty(), "no French for: {missing:#?}");

@@ -32,6 +32,8 @@ const APART: Duration = Duration::from_millis(700);
 /// A stranger, and the profile that drives it.
 struct Kind {
     key: &'static str,
+    /// How it is commanded.
+    pattern: &'static str,
     /// Its profile, where none is shipped.
     text: Option<&'static str>,
     script: &'static str,
@@ -48,9 +50,10 @@ struct Kind {
     enables: &'static [(u16, u16)],
 }
 
-const fn kind(key: &'static str, script: &'static str) -> Kind {
+const fn kind(key: &'static str, script: &'static str, pattern: &'static str) -> Kind {
     Kind {
         key,
+        pattern,
         text: None,
         script,
         arguments: &[],
@@ -83,50 +86,81 @@ struct Truth {
 /// All of them, each with a profile that is shipped.
 fn kinds() -> Vec<Kind> {
     vec![
-        kind("v20", "v20.py"),
-        kind("wj200", "wj200.py"),
-        kind("mx2", "wj200.py"),
-        Kind { arguments: &["102"], ..kind("danfoss-fc", "danfoss.py") },
+        kind("v20", "v20.py", "PROFIdrive"),
+        kind("wj200", "wj200.py", "coils"),
+        kind("mx2", "wj200.py", "coils"),
+        Kind { arguments: &["102"], ..kind("danfoss-fc", "danfoss.py", "bits") },
         // REF of 2666h is 60 %, 047Ch runs it by the FC profile: FC 202 Design Guide p. 175.
         Kind {
             arguments: &["51"],
             others: &[(50_009, 0x2666), (49_999, 0x047C)],
-            ..kind("danfoss-fc51", "danfoss.py")
+            ..kind("danfoss-fc51", "danfoss.py", "bits")
         },
-        kind("goodrive", "goodrive.py"),
+        kind("goodrive", "goodrive.py", "code"),
         // Forward run, A. p. 786; 30 Hz.
-        Kind { others: &[(0x2001, 3_000), (0x2000, 0x12)], trip: 1, ..kind("ms300", "ms300.py") },
-        Kind { arguments: &["s15"], ..kind("vfs15", "toshiba.py") },
-        Kind { arguments: &["320"], ..kind("altivar", "altivar.py") },
+        Kind { others: &[(0x2001, 3_000), (0x2000, 0x12)], trip: 1, ..kind("ms300", "ms300.py", "bits") },
+        Kind { arguments: &["s15"], ..kind("vfs15", "toshiba.py", "bits") },
+        Kind { arguments: &["320"], ..kind("altivar", "altivar.py", "CiA 402") },
         // Printed 0004, write enable: 0 at power-up.
-        Kind { enables: &[(3, 1)], trip: 1, ..kind("ig5a", "ig5a.py") },
+        Kind { enables: &[(3, 1)], trip: 1, ..kind("ig5a", "ig5a.py", "bits") },
         // Its works setting trips it within 100 ms of silence.
-        Kind { arguments: &["--set", "p2040=0"], ..kind("g120", "g120.py") },
+        Kind { arguments: &["--set", "p2040=0"], ..kind("g120", "g120.py", "PROFIdrive") },
         // 0002h in 0.01 Hz, 0001h bit 0 runs forward: SIEPC71061627 p. 559.
-        Kind { others: &[(2, 3_000), (1, 1)], ..kind("a1000", "yaskawa.py") },
+        Kind { others: &[(2, 3_000), (1, 1)], ..kind("a1000", "yaskawa.py", "bits") },
         // The ABB Drives profile: 0406h, 0407h, 046Fh; REF1 of 20000 is 100 %.
         Kind {
             arguments: &["550"],
             others: &[(0, 0x0406), (1, 12_000), (0, 0x0407), (0, 0x046F)],
             trip: 1,
-            ..kind("acs550", "abb.py")
+            ..kind("acs550", "abb.py", "ABB")
         },
-        // Two patterns of control that no shipped profile has at motion.
+        // Three patterns of control that no shipped profile has at motion.
+        Kind {
+            text: Some(include_str!("../crates/drive-profile/tests/data/abb.toml")),
+            arguments: &["355"],
+            trip: 1,
+            ..kind("abb", "abb.py", "ABB")
+        },
         Kind {
             text: Some(include_str!("../crates/drive-profile/tests/data/split.toml")),
             arguments: &["split"],
             trip: 1,
             options: &[],
-            ..kind("split", "nobody.py")
+            ..kind("split", "nobody.py", "split registers")
         },
         Kind {
             text: Some(include_str!("../crates/drive-profile/tests/data/signed.toml")),
             arguments: &["signed"],
             trip: 1,
             options: &[],
-            ..kind("signed", "nobody.py")
+            ..kind("signed", "nobody.py", "setpoint is the command")
         },
     ]
+}
+
+/// The third column of the table of patterns in the README of `drive-profile`.
+#[test]
+fn the_readme_names_the_strangers_of_each_pattern() {
+    let readme = include_str!("../crates/drive-profile/README.md");
+    let rows =
+        readme.split("| Pattern |").nth(1).and_then(|rest| rest.split("\n\n").next()).expect("there is one");
+    let rows =
+        rows.lines().skip(2).map(|row| row.trim_matches('|').split('|').map(str::trim).collect::<Vec<_>>());
+    let mut named = 0;
+    for row in rows {
+        let of_it = kinds().into_iter().filter(|kind| kind.pattern == row[0]).map(|kind| {
+            named += 1;
+            let profile = kind.profile();
+            let how = match profile.level() {
+                Level::Motion if profile.file().start.reverse.given().is_none() => " (not reversed)",
+                Level::Motion => "",
+                _ => " (stopped alone)",
+            };
+            format!("`{}`{how}", kind.key)
+        });
+        assert_eq!(row[2], of_it.collect::<Vec<_>>().join(", "), "{}", row[0]);
+    }
+    assert_eq!(named, kinds().len(), "each is in a pattern of the table");
 }
 
 /// All at once: most of a life is waiting for a motor.

@@ -180,6 +180,16 @@ pub trait Drive: Send {
     /// [`stop`](Self::stop) takes it back.
     async fn start(&mut self, direction: Direction) -> Result<Status>;
 
+    /// Whether [`start`](Self::start) would refuse this direction as the drive is now. Asked before the setpoint that belongs to a start
+    /// is given: a start that is refused has changed no speed of a motor that runs by somebody else's command. Nothing is written.
+    ///
+    /// # Errors
+    /// Those of [`start`](Self::start), as far as they are known before anything is written.
+    async fn may_start(&mut self, direction: Direction) -> Result<()> {
+        let _ = direction;
+        Ok(())
+    }
+
     /// Stops the motor, whatever is known of the drive and whatever its settings are: **it never ends without a stop on
     /// the wire**. A mode that the family, or the drive as it is set up, does not have is replaced: by the stop that the
     /// drive's own settings select when the run command goes, provided that it acts; else by a fast stop; else by

@@ -72,7 +72,7 @@ impl Fault {
     /// What to do first, where it is known.
     #[must_use]
     pub fn remedy(&self) -> Option<&'static str> {
-        self.entry.map(|entry| entry.remedy)
+        self.entry.map(|entry| entry.remedy).filter(|remedy| !remedy.is_empty())
     }
 }
 

@@ -8,7 +8,7 @@ use std::{
 };
 
 use drive_bus::Slave;
-use drive_core::{Drive, Error, Lease, Lifetimes};
+use drive_core::{Direction, Drive, Error, Lease, Lifetimes, Setpoint};
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
     time::{Instant, sleep_until},
@@ -325,7 +325,7 @@ fn lifetimes(job: Job, lifetime: Option<Duration>) -> Lifetimes {
     let usual = Lifetimes::default();
     match job {
         Job::Status { .. } => Lifetimes { status: lifetime, ..usual },
-        Job::SetSetpoint(_) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
+        Job::SetSetpoint(..) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
             Lifetimes { command: lifetime, ..usual }
         }
         Job::Stop(_) | Job::Withdraw => Lifetimes { command: None, ..usual },
@@ -351,13 +351,21 @@ async fn call(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Re
     reply
 }
 
+/// A motor that runs by somebody else's command is not given the setpoint of a start that it will refuse.
+async fn given(drive: &mut dyn Drive, setpoint: Setpoint, start: Option<Direction>) -> Result<(), Error> {
+    if let Some(direction) = start {
+        drive.may_start(direction).await?;
+    }
+    drive.set_setpoint(setpoint).await
+}
+
 async fn asked(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Reply {
     *drive.lifetimes_mut() = lifetimes(job, lifetime);
     match job {
         Job::Stop(mode) => Reply::Stopped(drive.stop(mode).await),
         Job::Withdraw => Reply::Withdrawn(drive.withdraw().await),
         Job::Start(direction) => Reply::Ordered(drive.start(direction).await),
-        Job::SetSetpoint(setpoint) => Reply::Setpoint(drive.set_setpoint(setpoint).await),
+        Job::SetSetpoint(setpoint, start) => Reply::Setpoint(given(drive, setpoint, start).await),
         Job::ResetFaults => Reply::Ordered(drive.reset_faults().await),
         Job::Release => Reply::Ordered(drive.release().await),
         Job::Persist => Reply::Saved(drive.persist().await),
@@ -399,7 +407,7 @@ mod tests {
     fn the_look_at_a_stop_has_all_the_time_whatever_was_left_to_the_order_before() {
         let (short, usual) = (Some(Duration::from_millis(54)), Lifetimes::default());
         let setpoint = Frequency::from_hertz(20).into();
-        let orders = [Job::SetSetpoint(setpoint), Job::ResetFaults, Job::Release, Job::Persist];
+        let orders = [Job::SetSetpoint(setpoint, None), Job::ResetFaults, Job::Release, Job::Persist];
         for order in [Job::Start(Direction::Forward)].into_iter().chain(orders) {
             assert_eq!(lifetimes(order, short), Lifetimes { command: short, ..usual }, "{order:?}");
         }

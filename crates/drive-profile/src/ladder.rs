@@ -7,7 +7,7 @@ use crate::format::Spanned;
 use crate::{
     format::{Action, Answer, FedBy, File, Proves, Setpoint, Space, StateIs, StateName, Storage, UnitName},
     scale::hundredths,
-    source::{grade, line},
+    source::{asked, grade, line},
 };
 
 /// Registers of commands that several makers have, each with words of its own: what stops one maker's drive runs another's.
@@ -473,15 +473,7 @@ impl<'a> Ladder<'a> {
 
     /// Where a question stands in the file.
     fn of(&self, key: &str) -> usize {
-        let mut at = 0;
-        for line in self.text.split_inclusive('\n') {
-            let asked = line.strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='));
-            if asked || line.trim_end() == format!("[{key}]") {
-                return at;
-            }
-            at += line.len();
-        }
-        0
+        asked(self.text, key)
     }
 
     /// What keeps from a level until a question of the file is answered.

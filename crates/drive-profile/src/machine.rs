@@ -5,7 +5,7 @@ mod bits;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use drive_core::{Direction, Frequency, State};
+use drive_core::{Direction, Frequency, State, registers::Place};
 use drive_sim::{
     Act, Cast, Exception, Model, Motor, Nameplate, Observation, Panel, Ramp, Ramps, Rules, Surroundings,
 };
@@ -182,7 +182,7 @@ impl Machine {
             (self.order, self.ramp) = (None, FAST);
         } else if writes(&file.stop.ramp).contains(&written) {
             (self.order, self.ramp) = (None, RAMP);
-        } else if writes(&file.reset).contains(&written) {
+        } else if writes(&file.reset).contains(&written) || self.has_reset_bit(written) {
             (self.order, self.fault) = (None, None);
         } else if self.order.is_some()
             && file.command.given().is_some_and(|of| of.get_ref().acts == Acts::Level)
@@ -205,6 +205,28 @@ impl Machine {
         if self.fault.is_some() || !self.supplied || self.local {
             self.order = None;
         }
+    }
+
+    /// Whether a word of a command of bits has the bit that rises in a reset, whatever else it has: a direction, say.
+    fn has_reset_bit(&self, written: Written) -> bool {
+        let file = self.profile.file();
+        let Some(reset) = file.reset.given().map(crate::format::Spanned::get_ref) else { return false };
+        let at_place = |of: &Written| (of.space, of.address) == (written.space, written.address);
+        let steps = reset.steps.iter().map(|step| file.written(step.get_ref(), None));
+        let words: Vec<Vec<Written>> = steps.collect();
+        let left = words.iter().flatten().rev().find(|of| at_place(of));
+        let rising = words.get(file.rising(reset)).into_iter().flatten().find(|of| at_place(of));
+        let (Some(rising), Some(left)) = (rising, left) else { return false };
+        let of_bits = file.command.given().is_some_and(|command| {
+            let mut runs = command.get_ref().runs.iter().map(crate::format::Spanned::get_ref).filter(|run| {
+                let register = file.named(run.register.get_ref());
+                register.and_then(|register| file.place(register)) == Some((written.space, written.address))
+            });
+            runs.next().is_some_and(|run| run.mask.get_ref() != &u16::MAX)
+                && runs.all(|run| run.mask.get_ref() != &u16::MAX)
+        });
+        let bits = rising.value & !left.value;
+        of_bits && bits != 0 && written.value & bits == bits
     }
 
     /// Whether a word takes the place of the run word that stands, and is none.
@@ -253,7 +275,12 @@ impl Machine {
         for guard in
             [&file.who.guards, &file.who.fingerprints].into_iter().filter_map(|all| all.given()).flatten()
         {
-            self.fulfil(&mut words, guard.get_ref());
+            // A setting that somebody has changed is what he has made it: the guard holds no more.
+            let place =
+                file.named(guard.get_ref().register.get_ref()).and_then(|register| file.place(register));
+            if place.is_none_or(|place| !self.kept.contains_key(&place)) {
+                self.fulfil(&mut words, guard.get_ref());
+            }
         }
         for name in self.limits() {
             if !file
@@ -619,18 +646,34 @@ impl Model for Machine {
     }
 
     fn peek(&self, address: u16) -> Option<u16> {
-        let place = (Space::HoldingRegister, address);
-        self.register(place)?;
-        Some(self.shown().get(&place).copied().unwrap_or(0))
+        self.peek_at(address.into())
     }
 
     fn poke(&mut self, address: u16, value: u16) -> bool {
-        let place = (Space::HoldingRegister, address);
-        let writable = self.register(place).is_some_and(|register| register.access != Access::Read);
-        if writable {
-            self.kept.insert(place, value);
-            self.steer();
+        self.poke_at(address.into(), value)
+    }
+
+    fn peek_at(&self, Place { space, address }: Place) -> Option<u16> {
+        self.register((space, address))?;
+        Some(self.shown().get(&(space, address)).copied().unwrap_or(0))
+    }
+
+    /// What is only read is what something beside the drive makes it, an input or a temperature, unless the twin itself says what stands there.
+    fn poke_at(&mut self, Place { space, address }: Place, value: u16) -> bool {
+        let place = (space, address);
+        let Some(access) = self.register(place).map(|register| register.access) else { return false };
+        if space.is_bit() && value > 1 {
+            return false;
         }
-        writable
+        let before = self.kept.insert(place, value);
+        if access == Access::Read && self.shown().get(&place) != Some(&value) {
+            match before {
+                Some(before) => self.kept.insert(place, before),
+                None => self.kept.remove(&place),
+            };
+            return false;
+        }
+        self.steer();
+        true
     }
 }

@@ -78,7 +78,8 @@ impl Profile {
     pub fn keeps_from(&self, level: Level) -> Option<String> {
         (self.level < level).then(|| {
             let gap = self.gaps.iter().find(|gap| gap.keeps_from.is_some_and(|of| of <= level));
-            let because = gap.map(|gap| format!(": {}, line {}", gap.what, gap.line)).unwrap_or_default();
+            let because =
+                gap.map(|gap| format!(": {}, line {} of its file", gap.what, gap.line)).unwrap_or_default();
             format!("its profile reaches {} and no further{because}", self.level)
         })
     }

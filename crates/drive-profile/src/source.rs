@@ -12,6 +12,19 @@ pub(crate) fn line(text: &str, span: &Range<usize>) -> usize {
     before.bytes().filter(|byte| *byte == b'\n').count() + 1
 }
 
+/// Where a question stands in a text, by its key or as a table of its own; the beginning where it does not.
+pub(crate) fn asked(text: &str, key: &str) -> usize {
+    let mut at = 0;
+    for line in text.split_inclusive('\n') {
+        let is_key = line.strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='));
+        if is_key || line.trim_end() == format!("[{key}]") {
+            return at;
+        }
+        at += line.len();
+    }
+    0
+}
+
 /// The names in a text of sources.
 pub(crate) fn names(source: &str) -> impl Iterator<Item = &str> {
     source.split_whitespace()

@@ -12,6 +12,7 @@ use tokio::time::{Instant, sleep};
 
 const SIGNED: &str = include_str!("data/signed.toml");
 const SPLIT: &str = include_str!("data/split.toml");
+const ABB: &str = include_str!("data/abb.toml");
 
 /// Where the drive of `signed.toml` takes its setpoint.
 const SPEED: u16 = 0x000E;
@@ -61,18 +62,56 @@ async fn written_while(rig: &mut Rig, register: u16, time: Duration) -> Vec<u16>
     words
 }
 
-/// Each pattern of control, with a profile that has it, and how its drives are turned round where it does not say.
-const PATTERNS: [(&str, &str, Turned); 9] = [
-    ("a code", "goodrive", Turned::Round),
+/// Each pattern of control, with the profiles that have it, and how their drives are turned round where they do not say. Every profile that is
+/// shipped at motion is among them.
+const PATTERNS: [(&str, &str, Turned); 13] = [
+    ("code", "goodrive", Turned::Round),
     ("bits", "danfoss-fc", Turned::Round),
     ("bits", "vfs15", Turned::Round),
+    ("bits", "ig5a", Turned::Round),
     ("CiA 402", "atv312", Turned::Round),
     ("CiA 402", "altivar", Turned::NotKnown),
     ("PROFIdrive", "v20", Turned::Round),
+    ("PROFIdrive", "g120", Turned::Round),
+    ("ABB", "abb", Turned::NotKnown),
     ("coils", "wj200", Turned::Round),
+    ("coils", "mx2", Turned::Round),
     ("split registers", "split", Turned::Round),
     ("setpoint is the command", "signed", Turned::Round),
 ];
+
+/// The second column of the README's table.
+#[test]
+fn the_readme_names_the_twins_of_each_pattern() {
+    let readme = include_str!("../README.md");
+    let rows =
+        readme.split("| Pattern |").nth(1).and_then(|rest| rest.split("\n\n").next()).expect("there is one");
+    let rows: Vec<Vec<&str>> = rows
+        .lines()
+        .skip(2)
+        .map(|row| row.trim_matches('|').split('|').map(str::trim).collect::<Vec<_>>())
+        .collect();
+    let mut patterns: Vec<&str> = PATTERNS.iter().map(|(pattern, ..)| *pattern).collect();
+    patterns.dedup();
+    assert_eq!(rows.iter().map(|row| row[0]).collect::<Vec<_>>(), patterns);
+    for row in rows {
+        let of_it = PATTERNS.iter().filter(|(pattern, ..)| *pattern == row[0]);
+        let named: Vec<String> = of_it
+            .map(|(_, key, turned)| match turned {
+                Turned::Round => format!("`{key}`"),
+                Turned::NotKnown => format!("`{key}` (not reversed)"),
+            })
+            .collect();
+        assert_eq!(row[1], named.join(", "), "{}", row[0]);
+    }
+    for profile in shipped::all().iter().filter(|profile| profile.level() == Level::Motion) {
+        assert!(
+            PATTERNS.iter().any(|(_, key, _)| *key == profile.key()),
+            "{} is in no pattern",
+            profile.key()
+        );
+    }
+}
 
 #[derive(Debug, PartialEq)]
 enum Turned {
@@ -88,6 +127,7 @@ async fn each_pattern_of_control_is_lived_through_each_act() {
     for (pattern, key, turned) in PATTERNS {
         let profile = match key {
             "atv312" => profile(include_str!("../../../tests/profiles/atv312.toml")),
+            "abb" => profile(ABB),
             "split" => profile(SPLIT),
             "signed" => profile(SIGNED),
             key => shipped::find(key).expect("it is shipped").clone(),
@@ -202,6 +242,88 @@ async fn a_setpoint_that_is_the_run_command_is_kept_until_a_start() {
     words.extend(written_since(&rig, SPEED, began));
     assert_eq!((refused.kind(), words), (ErrorKind::Refused, vec![]), "{refused}");
     assert!(!rig.machine.observe().running);
+}
+
+/// FA00 is a word of bits (E6581913 p. 25-26; the Altivar 21's manual 8.2): 13 resets, whatever 9, the direction, is. Bit 7 of a control
+/// word likewise (FC 102 Design Guide p. 144). A code is one whole.
+#[tokio::test(start_paused = true)]
+async fn a_reset_by_a_bit_is_obeyed_whatever_the_direction_bit_says_and_one_by_a_code_is_not() {
+    for (key, register, word, resets) in [
+        ("vfs15", 0xFA00, 0xE200, true),
+        ("vfs15", 0xFA00, 0xC200, false),
+        ("danfoss-fc", CTW, 0x84BC, true),
+        ("goodrive", 0x2000, 0x0207, false),
+    ] {
+        let rig = rig(shipped::find(key).expect("it is shipped").clone());
+        rig.machine.trip(9);
+        rig.machine.written_by_another(register, word).expect("it takes it");
+        let seen = rig.machine.observe();
+        assert_eq!((seen.trip.is_none(), seen.running), (resets, false), "{key} {word:04X}h");
+    }
+}
+
+/// 5305 chooses between two meanings of the same words (ACS355 p. 313), and 0004 of an iG5A lets nothing be written at 0 (p. 11-3): somebody
+/// changes it at the panel of the twin, and no start goes out any more.
+#[tokio::test(start_paused = true)]
+async fn a_guard_that_is_broken_at_the_twins_panel_lets_no_start_through() {
+    let ig5a = shipped::find("ig5a").expect("it is shipped").clone();
+    for (profile, register, word) in [(profile(ABB), 5_304, 1), (ig5a, 3, 0)] {
+        let key = profile.key().to_owned();
+        let mut rig = rig(profile);
+        let given = rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await;
+        assert!(given.as_ref().err().is_none_or(Error::only_a_start_shows), "{key}: {given:?}");
+        assert!(rig.machine.poke(register, word), "{key}");
+        rig.drive.forget();
+        let refused = rig.drive.start(Direction::Forward).await.expect_err("its words mean something else");
+        assert_eq!(refused.kind(), ErrorKind::Refused, "{key}: {refused}");
+        assert!(!rig.machine.observe().running, "{key}");
+    }
+}
+
+/// A start that will be refused is told so before its setpoint is given: the motor runs by a command that this side has not given.
+#[tokio::test(start_paused = true)]
+async fn a_start_that_would_be_refused_is_known_before_anything_is_written() {
+    let mut rig = rig(shipped::find("goodrive").expect("it is shipped").clone());
+    rig.machine.written_by_another(0x2001, 2_000).expect("20 Hz by the bus");
+    rig.machine.written_by_another(0x2000, 1).expect("a run command");
+    rig.until_machine("it runs", |seen| seen.output_frequency == 2_000).await;
+    let before = rig.machine.requests(6);
+    let refused = rig.drive.may_start(Direction::Forward).await.expect_err("another has started it");
+    assert_eq!(refused.kind(), ErrorKind::Refused, "{refused}");
+    assert_eq!(rig.machine.requests(6), before, "nothing is written to ask that");
+    rig.machine.written_by_another(0x2000, 5).expect("a stop");
+    rig.until_machine("it stands", |seen| !seen.running && seen.shaft_frequency == 0).await;
+    rig.drive.may_start(Direction::Forward).await.expect("nothing speaks against it");
+}
+
+const SPACES: &str = include_str!("data/spaces.toml");
+
+/// By the lines of text that `drived sim` reads: a coil, an input and an input register of one address with a holding register.
+#[tokio::test(start_paused = true)]
+async fn what_stands_in_each_of_the_four_spaces_is_shown_and_set_beside_the_line() {
+    let line = drive_sim::SimLine::default();
+    let family = Family::new(definition(&Arc::new(profile(SPACES))));
+    line.add_boxed(3, family.machine(SetUp::ForTheBus).expect("it has a twin")).expect("3 is free");
+    let said = |words: &str| line.control(&format!("spaces@3 {words}")).map_err(|error| error.to_string());
+    for (place, name, value, shown) in [
+        ("coil 512", "BRAKE", "on", "1 on"),
+        ("discrete input 512", "DOOR", "1", "1 on"),
+        ("input register 512", "SUPPLY", "325.0", "325.0 V"),
+        ("512", "ACC", "4.5", "4.5 s"),
+    ] {
+        assert_eq!(said(&format!("set {place} {value}")).as_deref(), Ok("done"), "{place}");
+        for place in [place, name] {
+            assert_eq!(said(&format!("get {place}")).as_deref(), Ok(shown), "{place}");
+        }
+    }
+    assert_eq!(said("master coil 512 0").as_deref(), Ok("done"));
+    assert_eq!(said("get BRAKE").as_deref(), Ok("0 off"));
+    // The drive alone says whether it runs; a bit is 0 or 1; nobody writes an input over the line.
+    for words in
+        ["set STATUS 1", "set discrete input 512 2", "set coil 9 1", "master DOOR 1", "get input register 9"]
+    {
+        said(words).expect_err(words);
+    }
 }
 
 /// Another master's setpoint in its place is another run command.

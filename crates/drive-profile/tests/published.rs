@@ -142,6 +142,30 @@ const MISTAKES: &[Mistake] = &[
         Below("stop.ramp rests on what is not sure"),
     ),
     (
+        "ESPHome, Home Assistant, mb2hal: what was asked for is taken for what is, and no state is read",
+        V20,
+        &[(
+            "    { state = \"running\", bits = { register = \"ZSW\", mask = 0x0004, value = 0x0004, source = \"oi2012 wb\" } },\n",
+            "",
+        )],
+        Below("nothing shows that it runs"),
+    ),
+    (
+        "FluidNC: a setpoint is cut to sixteen bits",
+        V20,
+        &[("limits = { low = 0, high = 16384 }", "limits = { low = 0, high = 70000 }")],
+        Refused("HSW cannot hold 70000"),
+    ),
+    (
+        "LinuxCNC wj200_vfd: an alarm is reset while the run command stands, and the motor starts by it",
+        WJ200,
+        &[(
+            "reset = { steps = [{ write = \"RUN\", coils = [false] }, { write = \"RESET\", coils = [true] }, { pause_ms = 1500 }, { write = \"RESET\", coils = [false] }, { write = \"RUN\", coils = [false] }]",
+            "reset = { steps = [{ write = \"RESET\", coils = [true] }, { write = \"RESET\", coils = [false] }]",
+        )],
+        Refused("the reset is left standing"),
+    ),
+    (
         "ESPHome: the setpoint is a number without limits",
         V20,
         &[("limits = { low = 0, high = 16384 }\n", "")],

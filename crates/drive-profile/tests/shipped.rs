@@ -80,8 +80,8 @@ fn strangers() -> Vec<(String, String)> {
     });
     // The drivers of LinuxCNC drive their twins.
     let test = include_str!("../../../tests/linuxcnc.rs");
-    let drivers = test.split("Bench::of(\"").skip(1).filter_map(|rest| {
-        let key = rest.split('"').next()?;
+    let drivers = test.split("let bench = Bench::of").skip(1).filter_map(|rest| {
+        let key = rest.split('"').nth(1)?;
         let driver = rest.split("loadusr -W ").nth(1)?.split(' ').next()?;
         Some((key.to_owned(), format!("LinuxCNC's {driver} (its twin)")))
     });

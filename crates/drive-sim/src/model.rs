@@ -2,7 +2,10 @@
 
 use std::time::Duration;
 
-use drive_core::SerialSettings;
+use drive_core::{
+    SerialSettings,
+    registers::{Place, Space},
+};
 
 use crate::world::{Act, Panel, Surroundings};
 
@@ -303,4 +306,14 @@ pub trait Model: Send {
     /// Changes a register from inside, without the rules of the line; `false` when there is no such register. For
     /// tests and for what happens at the machine (an input, a parameter set on the panel).
     fn poke(&mut self, address: u16, value: u16) -> bool;
+
+    /// As [`peek`](Self::peek), of a coil or an input too.
+    fn peek_at(&self, place: Place) -> Option<u16> {
+        if place.space == Space::HoldingRegister { self.peek(place.address) } else { None }
+    }
+
+    /// As [`poke`](Self::poke), of a coil or an input too.
+    fn poke_at(&mut self, place: Place, value: u16) -> bool {
+        place.space == Space::HoldingRegister && self.poke(place.address, value)
+    }
 }

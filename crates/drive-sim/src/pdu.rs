@@ -4,6 +4,7 @@ use crate::model::{Block, Cast, Exception, Model};
 
 pub(crate) const READ_HOLDING: u8 = 0x03;
 pub(crate) const READ_INPUT: u8 = 0x04;
+pub(crate) const WRITE_COIL: u8 = 0x05;
 pub(crate) const WRITE_SINGLE: u8 = 0x06;
 pub(crate) const DIAGNOSTICS: u8 = 0x08;
 pub(crate) const EVENT_COUNTER: u8 = 0x0B;
@@ -80,7 +81,7 @@ fn write(
 /// Whether an answer repeats what the request named, so that a master can check it: single and multiple writes, and
 /// the echo of function 08.
 pub(crate) fn is_confirmation(answer: &[u8]) -> bool {
-    matches!(answer, [0x05 | WRITE_SINGLE | DIAGNOSTICS | 0x0F | WRITE_MULTIPLE, ..])
+    matches!(answer, [WRITE_COIL | WRITE_SINGLE | DIAGNOSTICS | 0x0F | WRITE_MULTIPLE, ..])
 }
 
 /// The registers of a block, which may not run over the highest address.

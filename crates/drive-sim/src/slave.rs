@@ -6,6 +6,7 @@ use std::{
 };
 
 use bytes::Bytes;
+use drive_core::registers::{Place, Space};
 use tokio::time::Instant;
 
 use crate::{
@@ -375,17 +376,21 @@ impl Slave {
         }
     }
 
-    /// Another master writes one word, by the function that the family has for it.
+    /// Another master writes one word or coil, by the function that the family has for it.
     pub(crate) fn written_by_another(
         &mut self,
         now: Instant,
-        register: u16,
+        place: Place,
         value: u16,
     ) -> Result<(), Exception> {
-        let [[a, b], [c, d]] = [register, value].map(u16::to_be_bytes);
-        let request = match self.model.rules().write_single {
-            true => vec![pdu::WRITE_SINGLE, a, b, c, d],
-            false => vec![pdu::WRITE_MULTIPLE, a, b, 0, 1, 2, c, d],
+        let [[a, b], [c, d]] = [place.address, value].map(u16::to_be_bytes);
+        let request = match place.space {
+            Space::HoldingRegister if self.model.rules().write_single => {
+                vec![pdu::WRITE_SINGLE, a, b, c, d]
+            }
+            Space::HoldingRegister => vec![pdu::WRITE_MULTIPLE, a, b, 0, 1, 2, c, d],
+            Space::Coil => vec![pdu::WRITE_COIL, a, b, if value == 0 { 0 } else { 0xFF }, 0],
+            Space::DiscreteInput | Space::InputRegister => return Err(Exception::ILLEGAL_FUNCTION),
         };
         if self.hears(now, &request, Cast::Unicast) {
             pdu::answer(&mut *self.model, &request, Cast::Unicast)?;

@@ -1,7 +1,10 @@
 //! What is around a drive: its terminals, its analog inputs, its panel and its supplies, and the places where its
 //! manual can be read in two ways.
 
-use drive_core::{FaultEntry, Frequency, Percent, registers::Row};
+use drive_core::{
+    FaultEntry, Frequency, Percent,
+    registers::{Place, Row},
+};
 use tokio::time::Instant;
 
 /// What there is around the drives of a family, by name.
@@ -97,10 +100,10 @@ pub enum Intervention {
     Power(bool),
     /// It was tripped.
     Trip(u16),
-    /// A register was given a word without the line.
-    Set(u16, u16),
-    /// Another master of the line wrote a word to a register.
-    Master(u16, u16),
+    /// A register, a coil or an input was given a value without the line.
+    Set(Place, u16),
+    /// Another master of the line wrote a word to a register, or a coil.
+    Master(Place, u16),
 }
 
 /// An [`Intervention`], and when it was.

@@ -59,24 +59,13 @@ impl Folder {
     /// # Errors
     /// A file that is no profile, a name that is taken, a folder that cannot be read; nothing becomes known then.
     pub fn read(folder: &Path) -> Result<Self, ProfilesError> {
-        let mut read: BTreeMap<String, (PathBuf, Profile)> = BTreeMap::new();
-        for file in files(folder)? {
-            let profile = profile(&file)?;
-            let key = profile.key().to_owned();
-            if let Some((other, _)) = read.get(&key) {
-                return Err(ProfilesError::Twice { key, file, other: other.clone() });
-            }
-            if is_taken(&key) {
-                return Err(ProfilesError::Taken { key, file });
-            }
-            read.insert(key, (file, profile));
+        let (read, wrong) = look(folder)?;
+        if let Some(first) = wrong.into_iter().next() {
+            return Err(first);
         }
         let mut files = BTreeMap::new();
         for (key, (file, profile)) in read {
-            let profile = Arc::new(profile);
-            if let Err(taken) = take_up(profile, &file) {
-                return Err(ProfilesError::Taken { key: taken.0.to_owned(), file });
-            }
+            known_from(profile, &file)?;
             files.insert(key, file);
         }
         Ok(Self { files })
@@ -96,12 +85,47 @@ impl Folder {
     }
 }
 
-/// Reads the folder that the environment names, if it names one.
-///
-/// # Errors
-/// As [`Folder::read`].
-pub fn of_environment() -> Result<(), ProfilesError> {
-    folder_of_environment().map_or(Ok(()), |folder| Folder::read(&folder).map(drop))
+/// Reads the folder that the environment names, if it names one, and gives what is wrong there. Each file that is right becomes known all
+/// the same: one that is not keeps nobody from stopping the drive of another. Of two with one key the first by its path counts.
+#[must_use]
+pub fn of_environment() -> Vec<ProfilesError> {
+    let Some(folder) = folder_of_environment() else { return Vec::new() };
+    let (read, mut wrong) = match look(&folder) {
+        Ok(read) => read,
+        Err(error) => return vec![error],
+    };
+    wrong.extend(read.into_values().filter_map(|(file, profile)| known_from(profile, &file).err()));
+    wrong
+}
+
+/// The profiles of a folder by their keys, each with its file, and what is wrong with the others.
+type Looked = (BTreeMap<String, (PathBuf, Profile)>, Vec<ProfilesError>);
+
+fn look(folder: &Path) -> Result<Looked, ProfilesError> {
+    let (mut read, mut wrong) = Looked::default();
+    for file in files(folder)? {
+        let profile = match profile(&file) {
+            Ok(profile) => profile,
+            Err(error) => {
+                wrong.push(error);
+                continue;
+            }
+        };
+        let key = profile.key().to_owned();
+        if let Some((other, _)) = read.get(&key) {
+            wrong.push(ProfilesError::Twice { key, file, other: other.clone() });
+        } else if is_taken(&key) {
+            wrong.push(ProfilesError::Taken { key, file });
+        } else {
+            read.insert(key, (file, profile));
+        }
+    }
+    Ok((read, wrong))
+}
+
+fn known_from(profile: Profile, file: &Path) -> Result<(), ProfilesError> {
+    let taken = |taken: NameTaken| ProfilesError::Taken { key: taken.0.to_owned(), file: file.to_owned() };
+    take_up(Arc::new(profile), file).map_err(taken)
 }
 
 fn folder_of_environment() -> Option<PathBuf> {

@@ -4,6 +4,7 @@ use drive_core::{Capabilities, WatchdogCapability};
 use drive_families::{Family, Options};
 use serde_json::{Value, json};
 
+use drived_config::profiles;
 use drived_words::{
     failure::Failure,
     output::{self, JsonArgs, Table},
@@ -51,6 +52,8 @@ fn object(family: Family) -> Value {
         "watchdog": watchdogs(family),
         "identification": capabilities.identification,
         "persist": capabilities.persist,
+        "found_by_scan": family.tells_itself(),
+        "not_known": family.not_known(),
         "options": options.collect::<Vec<_>>(),
     })
 }
@@ -75,23 +78,42 @@ fn one(family: Family) -> Result<(), Failure> {
     output::say(format_args!("{family}: {}", capabilities.name))?;
     let mut facts = Table::texts();
     let mut fact = |label: &str, value: String| facts.row([format!("  {label}"), value]);
-    fact("addresses", format!("1 to {}", capabilities.highest_address));
-    fact("speeds", list(capabilities.speeds));
-    fact("formats", list(capabilities.formats));
+    // What a file leaves open is what any drive may have, and no fact of this one.
+    let profile = profiles::find(capabilities.key).map(|(profile, _)| profile);
+    let link = profile.as_ref().map(|profile| profile.file().link.get_ref());
+    let or_not_known = |is_open: Option<bool>, value: String| match is_open {
+        Some(true) => format!("not known; taken for {value}"),
+        _ => value,
+    };
+    let addresses = format!("1 to {}", capabilities.highest_address);
+    fact("addresses", or_not_known(link.map(|link| link.highest_address.is_unknown()), addresses));
+    fact("speeds", or_not_known(link.map(|link| link.speeds.is_unknown()), list(capabilities.speeds)));
+    fact("formats", or_not_known(link.map(|link| link.formats.is_unknown()), list(capabilities.formats)));
     fact("protocols", list(family.capabilities().protocols));
-    fact("factory setting", capabilities.factory.to_string());
+    let factory = capabilities.factory.to_string();
+    fact("factory setting", or_not_known(link.map(|link| link.factory.is_unknown()), factory));
     fact("stop modes", list(capabilities.stop_modes));
     fact("fault reset", capabilities.fault_reset.to_owned());
     fact("stations on a segment", capabilities.stations.to_string());
     fact("watchdog", watchdogs(family));
     fact("identification", capabilities.identification.unwrap_or("none").to_owned());
     fact("save to EEPROM", capabilities.persist.unwrap_or("no command").to_owned());
+    let found = if family.tells_itself() {
+        "yes"
+    } else {
+        "no: nothing that it reads tells it from other makers' drives"
+    };
+    fact("found by scan", found.to_owned());
     output::say_table(facts)?;
     let mut options = Table::new(["  --option", "what it says", "value"]);
     for option in family.options() {
         options.row([format!("  {}", option.name), option.meaning.to_owned(), option.value.to_owned()]);
     }
-    if options.is_empty() { output::say("  no options") } else { output::say_table(options) }
+    if options.is_empty() { output::say("  no options") } else { output::say_table(options) }?;
+    if !family.not_known().is_empty() {
+        output::say("  what nobody can know of it:")?;
+    }
+    family.not_known().iter().try_for_each(|said| output::say(format_args!("    {said}")))
 }
 
 /// The watchdog on each of the family's protocols.

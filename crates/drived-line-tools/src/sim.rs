@@ -121,6 +121,7 @@ fn describe(name: &DriveName, set_up: SetUp) -> String {
     let options =
         if set_up == SetUp::ForTheBus { simulated::options().of(name.family) } else { Options::default() };
     let told: Vec<String> = options.iter().map(|(name, text)| format!("--option {name}={text}")).collect();
-    let told = if told.is_empty() { String::new() } else { format!(" ({})", told.join(" ")) };
+    let told =
+        if told.is_empty() { String::new() } else { format!(" (to be opened with {})", told.join(" ")) };
     format!("  {name:<12} {}{told}", name.family.capabilities().name)
 }

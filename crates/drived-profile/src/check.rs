@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf};
 
 use drive_bus::{exchange::rtu, pdu};
 use drive_core::tokio_modbus::Request;
-use drive_profile::{Level, Profile, Refusals};
+use drive_profile::{Profile, Refusals};
 use serde_json::{Value, json};
 
 use drived_config::profiles;
@@ -35,17 +35,23 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
+/// What it has reached, and what comes next.
+pub(crate) fn reached(profile: &Profile) -> [String; 2] {
+    let next = profile.gaps().iter().find(|gap| gap.keeps_from.is_some());
+    [
+        format!("{}: it reaches {}", profile.name(), profile.level()),
+        next.map_or_else(
+            || "nothing keeps it from motion".to_owned(),
+            |next| format!("next question, line {}: {} ({})", next.line, next.question, next.what),
+        ),
+    ]
+}
+
 fn tell(args: &Args, profile: &Profile) -> Result<(), Failure> {
-    output::say(format_args!("{}: it reaches {}", profile.name(), profile.level()))?;
+    reached(profile).into_iter().try_for_each(output::say)?;
     let (keeps, said): (Vec<_>, Vec<_>) = profile.gaps().iter().partition(|gap| gap.keeps_from.is_some());
-    if let Some(next) = keeps.first() {
-        output::say(format_args!("next question, line {}: {} ({})", next.line, next.question, next.what))?;
-    }
     for gap in keeps.iter().skip(1) {
         output::say(format_args!("  line {}: {}: {}", gap.line, gap.what, gap.question))?;
-    }
-    if profile.level() == Level::Motion {
-        output::say("nothing keeps it from motion")?;
     }
     let frames = frames(profile);
     if !frames.is_empty() {
@@ -86,7 +92,7 @@ fn tell_refusals(args: &Args, refusals: &Refusals) -> Result<(), Failure> {
         }
         output::say(format_args!("  write {}", refusal.write))?;
     }
-    Ok(())
+    output::say("what else there is may show once this is mended: check it again")
 }
 
 pub(crate) fn object(profile: &Profile) -> Value {

@@ -9,6 +9,8 @@
 )]
 
 mod check;
+#[cfg(test)]
+mod hour;
 mod list;
 mod named;
 mod new;

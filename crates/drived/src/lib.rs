@@ -42,7 +42,7 @@ pub fn program() -> ExitCode {
         return cli::end(Err(Failure::Input(taken.to_string())));
     }
     // What is wrong with a file there keeps nobody from stopping another drive.
-    if let Err(wrong) = profiles::of_environment() {
+    for wrong in profiles::of_environment() {
         output::complain(format_args!("{}: {wrong}", profiles::ENVIRONMENT));
     }
     let cli = match cli::Cli::try_parse() {

@@ -3,6 +3,7 @@ line on its stdin by a line of JSON:
 
     rows           the rows of the overview: the text of each cell, and whether it is shown as one of now, by the drive's name
     drive NAME     what the page of a drive shows: its large values and its measurements, as they stand beside their names
+    unseen NAME    what its file cannot tell of a drive, in English and in French, and the registers of its list of parameters
     alarms         the alarms, as they are shown on a screen and on a phone: title, state, who has done what
 
 It ends with 0 when its stdin does, and nothing was complained of in the console."""
@@ -25,6 +26,10 @@ ROWS = """() => Object.fromEntries([...document.querySelectorAll('.rows .row')].
 PAIRS = """() => Object.fromEntries([...document.querySelectorAll('.big > div, .tables dl.pairs')].flatMap(list => {
     const texts = [...list.querySelectorAll('dt')].map(one => [one.textContent, one.nextElementSibling.innerText]);
     return texts; }))"""
+# Of each sentence the language that it is marked with, where that is not the page's.
+UNSEEN = """() => [...document.querySelectorAll('details.panel:not([hidden])')].map(one => ({ title: one.querySelector('summary').textContent,
+    said: [...one.querySelectorAll('li')].map(li => li.textContent), marked: [...one.querySelectorAll('li')].map(li => li.lang) }))"""
+REGISTERS = """() => [...document.querySelectorAll('.wide-panel details[open] tbody th')].map(one => one.textContent)"""
 ALARMS = """() => [...document.querySelectorAll('.alarms li')].filter(one => one.checkVisibility()).map(one => ({
     title: one.querySelector('h2').innerText, state: one.querySelector('.life').innerText, text: one.innerText,
     isWhole: one.getBoundingClientRect().right <= innerWidth && document.documentElement.scrollWidth <= innerWidth }))"""
@@ -35,8 +40,8 @@ def main(url):
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"], timeout=PATIENCE_MS)
 
-        def opened(context, view):
-            page = browser.new_context(locale="en-GB", **context).new_page()
+        def opened(context, view, locale="en-GB"):
+            page = browser.new_context(locale=locale, **context).new_page()
             page.set_default_timeout(PATIENCE_MS)
             page.on("pageerror", lambda error: complaints.append(str(error)))
             page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
@@ -55,6 +60,15 @@ def main(url):
                         desk.goto(f"{url}#/alarms")
                         expect(desk.locator("main.view-alarms h1")).to_be_attached(timeout=PATIENCE_MS)
                     said = {"desk": desk.evaluate(ALARMS), "phone": phone.evaluate(ALARMS)}
+                case ["unseen", name]:
+                    said = {}
+                    for locale in ("en-GB", "fr-FR"):
+                        page = opened(DESK, f"#/drive/{name}", locale)
+                        expect(page.locator("details.panel:not([hidden]) li").first).to_be_attached(timeout=PATIENCE_MS)
+                        page.locator(".wide-panel details").last.locator("summary").click()
+                        expect(page.locator(".wide-panel details[open] tbody th").first).to_be_visible(timeout=PATIENCE_MS)
+                        said[locale[:2]] = {"unseen": page.evaluate(UNSEEN), "registers": page.evaluate(REGISTERS)}
+                        page.close()
                 case ["drive", name]:
                     desk.goto(f"{url}#/drive/{name}")
                     expect(desk.locator("main h1")).to_have_text(name, timeout=PATIENCE_MS)

@@ -1,6 +1,8 @@
 //! A drive from a file at every face: what it does not tell is told by none as a value, neither as zero nor as good; what is known is.
 #![cfg(target_os = "linux")]
 
+#[path = "support/page.rs"]
+mod page;
 #[path = "mqtt/rig.rs"]
 mod rig;
 mod support;
@@ -9,10 +11,11 @@ mod terminal;
 
 use std::{
     fs,
-    io::{Read as _, Write as _},
+    io::{BufRead as _, BufReader, Read as _, Write as _},
     net::TcpStream,
 };
 
+use serde_json::Value;
 use support::{File, Running, Sim, drived, free_port, get, path, run};
 use terminal::Terminal;
 
@@ -48,16 +51,28 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
     let socket = socket.to_str().expect("the path is text");
     let mut daemon = Running::start(&["run", "--config", file.path(), "--socket", socket]);
     daemon.wait_for(r#""event":"connected""#);
+    let stream = events(http);
     let started = run(&["start", "pump", "--setpoint", "20Hz", "--socket", socket]);
     assert_eq!(started.code, Some(0), "{started:?}");
 
     let report = path("profile-faces.html");
     let page = report.to_str().expect("the path is text");
     run(&["report", "--to", page, "--socket", socket]).assert_done();
-    let heard = ear.as_mut().map_or_else(String::new, |ear| {
+    let in_french = path("profile-faces-fr.html");
+    let page_fr = in_french.to_str().expect("the path is text");
+    run(&["report", "--language", "fr", "--to", page_fr, "--socket", socket]).assert_done();
+    let french = fs::read_to_string(&in_french).expect("it was written");
+    let _ = fs::remove_file(&in_french);
+    let (about, heard) = ear.as_mut().map_or_else(Default::default, |ear| {
+        let (_, about, _) =
+            ear.until(|topic, said| topic.ends_with("/about") && said.get("family").is_some());
         let (_, state, _) = ear.until(|topic, said| topic.ends_with("/state") && said["shows"] == "running");
-        state.to_string()
+        (about.to_string(), state.to_string())
     });
+    let shown = run(&["profile", "show", "wj200"]);
+    if page::Page::is_installed() {
+        the_page_tells_it_in_both_languages(http);
+    }
     // On a terminal: what is not told is a dash there too.
     let mut monitor = Terminal::start(&mut drived(&["monitor", "--socket", socket]), 120, 40);
     let screen = monitor.wait_for("running");
@@ -102,6 +117,31 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
             has: if broker.is_some() { &["running"] } else { none },
             lacks: &["output_frequency", "in_force"],
         },
+        Row {
+            face: "MQTT, about",
+            said: about,
+            has: if broker.is_some() { &["not_known", OWNER] } else { none },
+            lacks: none,
+        },
+        Row {
+            face: "event stream",
+            said: told_of(stream),
+            has: &["\"not_known\"", OWNER],
+            lacks: &["output_frequency"],
+        },
+        Row { face: "profile show", said: shown.assert_done().to_owned(), has: &[OWNER], lacks: none },
+        Row {
+            face: "families",
+            said: run(&["families", "wj200"]).assert_done().to_owned(),
+            has: &[OWNER],
+            lacks: none,
+        },
+        Row {
+            face: "French report",
+            said: french,
+            has: &["on ne sait pas si le variateur dit qui le commande"],
+            lacks: &[OWNER],
+        },
     ];
     for Row { face, said, has, lacks } in rows {
         for words in has {
@@ -123,13 +163,66 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
     let (code, last) = daemon.interrupt();
     assert_eq!(code, Some(0), "{last}");
     // The tools on the line, when nobody else holds it.
-    assert!(sim.on("wj200@3", &["doctor", "--for", "1s"]).out.contains("wj200@3"));
+    let looked = sim.on("wj200@3", &["doctor", "--for", "1s"]);
+    assert!(looked.out.contains("wj200@3") && looked.out.contains(OWNER), "{looked:?}");
     let backup = path("profile-faces-backup.toml");
     let (backup, line) = (backup.to_str().expect("the path is text"), format!("{},19200,8N1", sim.link()));
     let kept = run(&["param", "backup", "--to", backup, "--line", &line, "wj200@3"]);
     assert!(kept.code != Some(0) && kept.err.contains("its family has no parameters"), "{kept:?}");
     let _ = fs::remove_file(&report);
     let _ = fs::remove_dir_all(&state);
+}
+
+/// The event stream, by which the page goes.
+fn events(http: u16) -> TcpStream {
+    let mut stream = TcpStream::connect(("127.0.0.1", http)).expect("it listens");
+    stream.write_all(b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n").expect("it hears");
+    stream
+}
+
+/// What it tells of the drive, once that runs.
+fn told_of(stream: TcpStream) -> String {
+    let mut lines = BufReader::new(stream).lines().map(|line| line.expect("it is text"));
+    let mut is_drive = false;
+    lines
+        .find(|line| {
+            let is_it = is_drive && line.starts_with("data:") && line.contains("running");
+            is_drive = line == "event: drive" || is_drive && !line.is_empty();
+            is_it
+        })
+        .expect("it tells of the drive")
+}
+
+/// Each sentence in the language of the page, and beside a parameter that is no holding register where it stands.
+fn the_page_tells_it_in_both_languages(http: u16) {
+    let mut page = page::Page::open(http);
+    let shown = page.shows("unseen pump");
+    let of = |language: &str| {
+        let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+        let list = |value: &Value| {
+            value.as_array().map(|all| all.iter().map(text).collect::<Vec<_>>()).unwrap_or_default()
+        };
+        let panel = &shown[language]["unseen"][0];
+        (
+            text(&panel["title"]),
+            list(&panel["said"]),
+            list(&panel["marked"]),
+            list(&shown[language]["registers"]),
+        )
+    };
+    let (title, said, marked, registers) = of("en");
+    assert_eq!(title, "What its file cannot tell of this drive");
+    assert!(said.iter().any(|said| said == OWNER) && marked.iter().all(String::is_empty), "{shown}");
+    assert!(registers.iter().any(|place| place == "RUN coil 0"), "{registers:?}");
+    let (title, said, marked, registers) = of("fr");
+    assert_eq!(title, "Ce que son fichier ne peut dire de ce variateur");
+    assert!(said.iter().any(|said| said == "on ne sait pas si le variateur dit qui le commande"), "{said:?}");
+    assert!(
+        said.iter().all(|said| !said.contains("known")) && marked.iter().all(String::is_empty),
+        "{shown}"
+    );
+    assert!(registers.iter().any(|place| place == "RUN bobine 0"), "{registers:?}");
+    page.close();
 }
 
 /// One holding register through a gateway: its word, or the function of the exception.

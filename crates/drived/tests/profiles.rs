@@ -62,6 +62,14 @@ fn a_drive_from_a_file_is_asked_and_commanded_on_a_line_as_the_five_are() {
     let started = on(&["start", "--option", "highest=50Hz"]);
     assert!(done(&started).contains("running"), "{}", started.out);
     assert!(started.err.contains("may start the motor when its power comes back"), "{}", started.err);
+    // A start that is refused has changed nothing: neither the direction nor the speed of a motor that runs.
+    for words in
+        [&["start", "--setpoint", "40Hz"][..], &["start", "--direction", "reverse", "--setpoint", "40Hz"]]
+    {
+        let again = on(&[words, &["--option", "highest=50Hz"]].concat());
+        refused(&again, "stop the motor first");
+        assert!(on(&["param", "get", "FREQ"]).assert_done().contains("20.00 Hz"), "{again:?}");
+    }
     on(&["stop"]).assert_done();
     assert!(on(&["param", "dump"]).assert_done().contains("STATE"));
     assert!(on(&["faults"]).code == Some(0));
@@ -136,6 +144,11 @@ fn the_environment_names_a_folder_for_every_subcommand_and_a_broken_file_there_s
     fs::write(folder.0.join("broken.toml"), "format = 1\n").expect("it can be written");
     let (code, said) = with(&["families"]);
     assert!(code == Some(0) && said.contains("broken.toml") && said.contains("atv312"), "{said}");
+    // Nor does a second file of one key, and the drive of the first is there all the same: its motor may have to be stopped.
+    fs::copy(folder.0.join("own.toml"), folder.0.join("twice.toml")).expect("it can be copied");
+    let (code, said) = with(&["families", "own-drive"]);
+    assert!(code == Some(0) && said.contains("INVT Goodrive") && said.contains("broken.toml"), "{said}");
+    assert!(said.contains("twice.toml") && said.contains("give one of them another"), "{said}");
 }
 
 /// The acceleration ramp of a Goodrive, P00.11, with where a value lives.

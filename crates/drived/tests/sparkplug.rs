@@ -228,6 +228,9 @@ fn a_drive_from_a_file_is_born_with_what_it_tells_and_takes_commands_as_the_othe
     let recording = Recording::of(plant.tap.packets());
     let output = last(&recording, "pump 1", "Status/Output Frequency");
     assert!(output.is_none_or(|metric| metric.double().is_none()), "what it does not tell is no value");
+    let unseen = last(&recording, "pump 1", "Properties/Not Known").and_then(|metric| metric.text());
+    let unseen = unseen.unwrap_or_default();
+    assert!(unseen.contains("whether the drive tells who commands it is not known; "), "{unseen:?}");
     let (code, _) = plant.daemon.take().expect("it runs").interrupt();
     assert_eq!(code, Some(0));
 }

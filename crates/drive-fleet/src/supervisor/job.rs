@@ -47,7 +47,8 @@ pub(crate) enum Job {
     Stop(StopMode),
     Withdraw,
     Start(Direction),
-    SetSetpoint(Setpoint),
+    /// With the direction of the start to which it belongs: where that start would be refused, it is not given.
+    SetSetpoint(Setpoint, Option<Direction>),
     ResetFaults,
     Release,
     Persist,

@@ -365,7 +365,7 @@ impl Supervisor {
     fn lifetime(&self, now: Instant, job: Job) -> Option<Duration> {
         match job {
             Job::Status { .. } => Some(self.pace.until_next(now, self.is_busy())),
-            Job::SetSetpoint(_) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
+            Job::SetSetpoint(..) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
                 Some(self.order_lifetime(now))
             }
             _ => None,

@@ -53,7 +53,7 @@ impl Active {
         match self.phase {
             Phase::Prepare => Some(self.expires),
             Phase::Sending(_) => None,
-            Phase::Verifying { job: Job::SetSetpoint(_), until, again, .. } => Some(until.min(again)),
+            Phase::Verifying { job: Job::SetSetpoint(..), until, again, .. } => Some(until.min(again)),
             Phase::Verifying { until, .. } | Phase::Awaiting { until, .. } => Some(until),
         }
     }
@@ -121,14 +121,14 @@ impl Supervisor {
                 self.end_active(Refused::Withdrawn, Unconfirmed::Withdrawn);
                 false
             }
-            Phase::Sending(Job::SetSetpoint(_)) => {
+            Phase::Sending(Job::SetSetpoint(..)) => {
                 // It may stand in the drive or not: a later start must not count on it.
                 self.given = None;
                 self.end_active(Refused::Withdrawn, Unconfirmed::Withdrawn);
                 true
             }
             _ if self.started_by == Some(id) => self.take_back(now),
-            Phase::Verifying { job: Job::SetSetpoint(_), .. } => {
+            Phase::Verifying { job: Job::SetSetpoint(..), .. } => {
                 self.end_active(Refused::Withdrawn, Unconfirmed::Withdrawn);
                 false
             }
@@ -217,7 +217,7 @@ impl Supervisor {
             let active = self.active.as_ref()?;
             match &active.phase {
                 Phase::Prepare => {}
-                Phase::Verifying { job: Job::SetSetpoint(_), until, again, .. } if *again <= now => {
+                Phase::Verifying { job: Job::SetSetpoint(..), until, again, .. } if *again <= now => {
                     return Some((Job::Measurements, Some(*until)));
                 }
                 Phase::Sending(_) | Phase::Verifying { .. } | Phase::Awaiting { .. } => return None,

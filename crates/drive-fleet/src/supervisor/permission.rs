@@ -138,14 +138,14 @@ impl Supervisor {
                     self.allow_motion(now, status, active)?;
                 }
                 self.allow_setpoint(now, setpoint)?;
-                Some(Job::SetSetpoint(setpoint))
+                Some(Job::SetSetpoint(setpoint, None))
             }
             Order::Start { direction, setpoint, .. } => {
                 self.allow_motion(now, status, active)?;
                 match setpoint {
                     Some(setpoint) if active.is_none_or(|active| !active.setpoint_given) => {
                         self.allow_setpoint(now, setpoint)?;
-                        Some(Job::SetSetpoint(setpoint))
+                        Some(Job::SetSetpoint(setpoint, Some(direction)))
                     }
                     // What the drive holds was given by nobody here, and may lie outside of the limits.
                     None if !self.settings.limits.is_empty() && self.given.is_none() => {

@@ -24,7 +24,8 @@ const READ_AGAIN: Duration = Duration::from_millis(100);
 
 impl Supervisor {
     pub(super) fn handle_setpoint_reply(&mut self, now: Instant, result: Result<()>) {
-        let Some(Active { phase: Phase::Sending(Job::SetSetpoint(setpoint)), .. }) = self.active else {
+        let Some(Active { phase: Phase::Sending(Job::SetSetpoint(setpoint, start)), .. }) = self.active
+        else {
             return;
         };
         match result {
@@ -49,7 +50,7 @@ impl Supervisor {
                             self.accept_status(now, status);
                         }
                     }
-                    _ => self.verify(now, Job::SetSetpoint(setpoint), error),
+                    _ => self.verify(now, Job::SetSetpoint(setpoint, start), error),
                 }
             }
         }
@@ -79,7 +80,7 @@ impl Supervisor {
     fn verify(&mut self, now: Instant, job: Job, error: Error) {
         let until = now + self.settings.times.effect;
         self.set_phase(Phase::Verifying { job, error, until, again: now, seen: false });
-        if !matches!(job, Job::SetSetpoint(_)) {
+        if !matches!(job, Job::SetSetpoint(..)) {
             self.pace.hurry(now);
         }
     }
@@ -139,7 +140,7 @@ impl Supervisor {
             _ => given,
         };
         match &mut active.phase {
-            Phase::Prepare | Phase::Sending(_) | Phase::Verifying { job: Job::SetSetpoint(_), .. } => {}
+            Phase::Prepare | Phase::Sending(_) | Phase::Verifying { job: Job::SetSetpoint(..), .. } => {}
             Phase::Awaiting { since, .. } => {
                 let after = now.saturating_duration_since(*since);
                 if has_reached(given, &status) {
@@ -211,7 +212,8 @@ impl Supervisor {
         result: Result<Measurements>,
     ) -> Result<Measurements> {
         let Some(Active {
-            phase: Phase::Verifying { job: Job::SetSetpoint(asked), error, again, .. }, ..
+            phase: Phase::Verifying { job: Job::SetSetpoint(asked, _), error, again, .. },
+            ..
         }) = &mut self.active
         else {
             return result;

@@ -452,11 +452,17 @@ impl Check<'_> {
                 "clears_itself = true or false",
             ),
             // A stop that runs the motor is told of the stop.
-            Some(false) if !last.is_some_and(stops) && !wrong => self.refuse(
-                &reset.span(),
-                "the reset is left standing: some drives reset again and again, or restart",
-                "a last step with the word of a stop",
-            ),
+            Some(false) if !last.is_some_and(stops) && !wrong => {
+                let stop = file.actions().find(|(name, _)| name.starts_with("stop."));
+                let stop =
+                    stop.and_then(|(name, stop)| Some((name, file.writes(stop.get_ref()).pop()?.value)));
+                let such = stop.map(|(name, word)| format!(", such as that of {name}, {word:04X}h"));
+                self.refuse(
+                    &reset.span(),
+                    "the reset is left standing, or its last word is that of no stop: some drives reset again and again, or restart",
+                    format!("a last step with the word of a stop{}", such.unwrap_or_default()),
+                );
+            }
             Some(_) => {}
         }
         // A reset begins and ends with a stop where the drive wants it so; what it does is the word that is none.

@@ -16,7 +16,7 @@ use crate::{
     format::{File, Register, VERSION},
     ladder,
     profile::Profile,
-    source::{line, names},
+    source::{asked, line, names},
 };
 
 /// The longest text that is read, in bytes: ten times the longest profile that is shipped.
@@ -190,8 +190,9 @@ impl<'a> Check<'a> {
             ("write_coils", &link.write_coils, 1_968),
         ] {
             if limit.given().is_some_and(|limit| !(1..=most).contains(limit)) {
+                let at = asked(self.text, what);
                 self.refuse(
-                    &spanned.span(),
+                    &(at..at),
                     format!("{what} is outside of what Modbus allows"),
                     format!("{what} = 1 to {most}, \"none\" or \"unknown\""),
                 );
@@ -208,7 +209,12 @@ impl<'a> Check<'a> {
             self.refuse(&factory.span(), "this is no setting of a line", "one such as \"19200 8E1\"");
         }
         if link.highest_address.given().is_some_and(|highest| !(1..=247).contains(highest)) {
-            self.refuse(&spanned.span(), "this is no slave address", "highest_address = 1 to 247");
+            let at = asked(self.text, "highest_address");
+            self.refuse(
+                &(at..at),
+                "this is no slave address",
+                "highest_address = 1 to 247, also where a manual prints more: Modbus has no others",
+            );
         }
     }
 

@@ -21,8 +21,10 @@ use crate::{
 
 const NOT_OURS: Refusal = Refusal::Overridden {
     by: "a run command that this side has not given",
-    remedy: "stop the motor first, and see what else commands it",
+    remedy: "stop the motor first, and see what else commands it; a setpoint alone changes the speed of one that runs",
 };
+const NO_SUCH_START: Error =
+    Error::Unsupported { what: "a start in this direction", reason: "its profile does not say how" };
 const NOT_ALONE: Refusal = Refusal::Settings(
     "the drive does not tell who commands it, and a reset may start the motor by another's run command: see that nothing else commands \
      it, and say so by commands-alone = yes",
@@ -44,25 +46,30 @@ const HELD_FOR: Duration = Duration::from_secs(1);
 const RUNGS: usize = 8;
 
 impl<P: Port> ProfileDrive<P> {
-    pub(super) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
+    /// Whether nothing speaks against a start, by what is read now; whether the motor was fed.
+    pub(super) async fn start_is_allowed(&mut self, direction: Direction) -> Result<bool> {
         let order = Order::Start(direction);
         self.allow(Level::Motion, "a start")?;
-        let profile = self.profile.clone();
-        let Some(action) = profile.start(direction) else {
-            return Err(Error::Unsupported {
-                what: "a start in this direction",
-                reason: "its profile does not say how",
-            });
-        };
+        if self.profile.start(direction).is_none() {
+            return Err(NO_SUCH_START);
+        }
         let (status, words) = self.read_status(Class::Command).await?;
         self.guard(order).await?;
         let local = self.commanded_by_other(&words);
         let was_fed = matches!(status.state, State::Running | State::Stopping);
         let runs = was_fed && self.comes_down.is_none();
         let others = (runs && self.watch.run.lease().is_none()).then_some(NOT_OURS);
-        if let Some(reason) = status.bars_motion().or(local).or(others) {
-            return Err(self.refused(order, reason));
+        match status.bars_motion().or(local).or(others) {
+            Some(reason) => Err(self.refused(order, reason)),
+            None => Ok(was_fed),
         }
+    }
+
+    pub(super) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
+        let order = Order::Start(direction);
+        let was_fed = self.start_is_allowed(direction).await?;
+        let profile = self.profile.clone();
+        let Some(action) = profile.start(direction) else { return Err(NO_SUCH_START) };
         if action.starts_by_setpoint() && self.kept.is_none() {
             return Err(self.refused(order, NO_SETPOINT));
         }

@@ -71,6 +71,11 @@ impl<P: Port> Drive for ProfileDrive<P> {
         self.start_motor(direction).await
     }
 
+    async fn may_start(&mut self, direction: Direction) -> Result<()> {
+        self.registers.begin_order();
+        self.start_is_allowed(direction).await.map(drop)
+    }
+
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
         self.stop_motor(mode).await
     }

@@ -4,7 +4,7 @@ mod words;
 
 use std::time::Duration;
 
-use drive_core::registers::Row;
+use drive_core::registers::{Place, Row, Space};
 
 use self::words::{Deed, Words};
 use crate::{
@@ -31,9 +31,9 @@ DRIVE trip OCF                    a fault by its mnemonic or its number
 DRIVE load 80%                    the load at the shaft
 DRIVE cable cut | join            the cable of this drive
 DRIVE busy on | off               whether it answers every request that it is busy, exception 06
-DRIVE get CMOD                    a register by its mnemonic or address, without the line
-DRIVE set CMOD 2                  a setting made at the panel, without the line
-DRIVE master 0xFA00 0400h         a word that another master of the line writes
+DRIVE get CMOD                    a register by its mnemonic or address, or `coil 14`, without the line
+DRIVE set CMOD 2                  a setting made at the panel, or an input that changes, without the line
+DRIVE master 0xFA00 0400h         a word, or a coil, that another master of the line writes
 DRIVE reading NAME READING        how the drive does what its manual leaves open";
 
 /// Longer than anybody simulates.
@@ -65,7 +65,7 @@ pub enum ControlError {
     #[error(transparent)]
     Name(#[from] UnknownName),
     /// The drive has no such register, or it keeps no such value.
-    #[error("{0} has no register {1} that takes this")]
+    #[error("{0} has no {1} that takes this")]
     Register(String, String),
     /// The drive refused what another master wrote.
     #[error("the drive answers exception {:02X}h", .0.0)]
@@ -156,14 +156,14 @@ impl SimSlave {
             Deed::Cable(true) => self.unmute(),
             Deed::Cable(false) => self.mute(),
             Deed::Busy(on) => self.keep_busy(if on { FOR_GOOD } else { Duration::ZERO }),
-            Deed::Set(register, value) if self.poke(register, value) => {}
+            Deed::Set(register, value) if self.poke_at(register, value) => {}
             Deed::Set(register, _) => return Err(self.no_register(register)),
             Deed::Master(register, value) => {
-                self.written_by_another(register, value).map_err(ControlError::Refused)?;
+                self.written_by_another_at(register, value).map_err(ControlError::Refused)?;
             }
             Deed::Get(register) => {
-                let value = self.peek(register).ok_or_else(|| self.no_register(register))?;
-                let row = self.surroundings().rows.iter().find(|row: &&Row| row.place() == register.into());
+                let value = self.peek_at(register).ok_or_else(|| self.no_register(register))?;
+                let row = self.surroundings().rows.iter().find(|row: &&Row| row.place() == register);
                 return Ok(Some(row.map_or_else(|| format!("{value:04X}h"), |row| row.show(value))));
             }
             Deed::Show => return Ok(Some(seen(self.observe()))),
@@ -171,8 +171,12 @@ impl SimSlave {
         Ok(None)
     }
 
-    fn no_register(&self, register: u16) -> ControlError {
-        ControlError::Register(self.name(), format!("{register:04X}h"))
+    fn no_register(&self, register: Place) -> ControlError {
+        let place = match register.space {
+            Space::HoldingRegister => format!("register {:04X}h", register.address),
+            _ => register.to_string(),
+        };
+        ControlError::Register(self.name(), place)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use drive_core::{
     Frequency, Percent,
-    registers::{Row, Space, Unit},
+    registers::{Place, Row, Unit},
 };
 
 use super::ControlError;
@@ -19,9 +19,9 @@ pub(super) enum Deed {
     Load(u16),
     Cable(bool),
     Busy(bool),
-    Get(u16),
-    Set(u16, u16),
-    Master(u16, u16),
+    Get(Place),
+    Set(Place, u16),
+    Master(Place, u16),
     Show,
 }
 
@@ -133,12 +133,19 @@ impl<'a> Words<'a> {
         code.ok_or_else(|| not(word, "a fault of this family, by its mnemonic or its number"))
     }
 
-    fn register(&mut self, around: &Surroundings) -> Result<(u16, Option<&'static Row>), ControlError> {
-        let word = self.next();
-        // A coil or an input is not set and read by its address alone.
-        let row = Row::find(around.rows, word).filter(|row| row.space == Space::HoldingRegister);
-        let address = row.map_or_else(|| Unit::COUNT.read(word), |row| Some(row.address));
-        Ok((address.ok_or_else(|| not(word, "a register, by its mnemonic or its address"))?, row))
+    /// A register, a coil or an input; by its address alone it is a holding register.
+    fn register(&mut self, around: &Surroundings) -> Result<(Place, Option<&'static Row>), ControlError> {
+        let word = match self.next() {
+            "coil" => format!("coil {}", self.next()),
+            first @ ("discrete" | "input" | "holding") => {
+                format!("{first} {} {}", self.next(), self.next())
+            }
+            word => word.to_owned(),
+        };
+        let row = Row::find(around.rows, &word);
+        let place = row.map(Row::place).or_else(|| Place::read(&word));
+        let place = place.or_else(|| Unit::COUNT.read(&word).map(Place::from));
+        Ok((place.ok_or_else(|| not(&word, "a register, by its mnemonic or its address"))?, row))
     }
 
     fn value(&mut self, row: Option<&Row>) -> Result<u16, ControlError> {

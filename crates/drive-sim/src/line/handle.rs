@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::Percent;
+use drive_core::{Percent, registers};
 use tokio::time::Instant;
 
 use super::SimLine;
@@ -200,9 +200,17 @@ impl SimSlave {
     /// # Errors
     /// The exception that the drive answers.
     pub fn written_by_another(&self, register: u16, value: u16) -> Result<(), Exception> {
+        self.written_by_another_at(register.into(), value)
+    }
+
+    /// The same, of a coil too: any value but 0 is on. An input is written by nobody.
+    ///
+    /// # Errors
+    /// The exception that the drive answers.
+    pub fn written_by_another_at(&self, place: registers::Place, value: u16) -> Result<(), Exception> {
         let mut result = Ok(());
-        self.intervene(Intervention::Master(register, value), |slave, _| {
-            result = slave.written_by_another(Instant::now(), register, value);
+        self.intervene(Intervention::Master(place, value), |slave, _| {
+            result = slave.written_by_another(Instant::now(), place, value);
         });
         result
     }
@@ -220,8 +228,20 @@ impl SimSlave {
 
     /// Changes a register, without the rules of the line; `false` when there is none.
     pub fn poke(&self, address: u16, value: u16) -> bool {
-        self.intervene(Intervention::Set(address, value), |slave, _| {
-            slave.at(Instant::now()).poke(address, value)
+        self.poke_at(address.into(), value)
+    }
+
+    /// The content of a register, a coil or an input, without the rules of the line.
+    #[must_use]
+    pub fn peek_at(&self, place: registers::Place) -> Option<u16> {
+        self.with(|slave, _| slave.at(Instant::now()).peek_at(place))
+    }
+
+    /// Changes a register, a coil or an input, without the rules of the line; `false` when there is none, or its drive alone says what
+    /// stands there.
+    pub fn poke_at(&self, place: registers::Place, value: u16) -> bool {
+        self.intervene(Intervention::Set(place, value), |slave, _| {
+            slave.at(Instant::now()).poke_at(place, value)
         })
     }
 

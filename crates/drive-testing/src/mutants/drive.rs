@@ -98,6 +98,10 @@ impl Drive for Faulty {
         self.drive.run_word_for(direction)
     }
 
+    async fn may_start(&mut self, direction: Direction) -> Result<()> {
+        self.drive.may_start(direction).await
+    }
+
     fn adopt(&mut self, lease: Lease) {
         self.drive.adopt(lease);
     }

@@ -129,6 +129,7 @@ const DRIVE: &[Row] = &[
     ("Properties/Line", DataType::String, "/line"),
     ("Properties/Slave", DataType::Int32, "/slave"),
     ("Properties/Family", DataType::String, "/family"),
+    ("Properties/Not Known", DataType::String, "/not_known"),
     ("Properties/Model", DataType::String, "/identity/model"),
     ("Properties/Firmware", DataType::String, "/identity/firmware"),
 ];
@@ -235,7 +236,11 @@ fn value(object: &Json, data_type: DataType, pointer: &str) -> Option<Value> {
     Some(match data_type {
         DataType::Double => Value::Double(found.as_f64()?),
         DataType::Boolean => Value::Boolean(found.as_bool()?),
-        DataType::String => Value::String(found.as_str()?.to_owned()),
+        DataType::String => Value::String(match found {
+            // Sentences.
+            Json::Array(all) => all.iter().filter_map(Json::as_str).collect::<Vec<_>>().join("; "),
+            _ => found.as_str()?.to_owned(),
+        }),
         DataType::DateTime => Value::DateTime(found.as_u64()?),
         DataType::UInt64 => Value::UInt64(found.as_u64()?),
         DataType::UInt32 => Value::UInt32(found.as_u64()?.try_into().ok()?),

@@ -21,6 +21,8 @@ struct Object<'a> {
     cut_short: Option<&'a str>,
     verdicts: Vec<VerdictObject<'a>>,
     slaves: Vec<SlaveObject>,
+    /// What nobody can know of the drives that are named.
+    not_known: Vec<String>,
     listened_ms: u64,
     frames_of_others: usize,
     noise_bytes: usize,
@@ -94,6 +96,7 @@ pub(super) fn of(diagnosis: &Diagnosis<'_>) -> String {
         cut_short: seen.cut_short.as_deref(),
         verdicts: diagnosis.verdicts.iter().map(verdict).collect(),
         slaves: diagnosis.figures().into_iter().map(slave).collect(),
+        not_known: diagnosis.not_known(),
         listened_ms: milliseconds(seen.listened.time),
         frames_of_others: seen.listened.frames().count(),
         noise_bytes: seen.listened.noise().count(),

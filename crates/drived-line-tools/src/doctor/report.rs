@@ -3,6 +3,7 @@
 use std::{fmt, time::Duration};
 
 use drive_bus::{Endpoint, adapter_latency};
+use drive_families::Family;
 
 use super::{
     judge::habits,
@@ -16,6 +17,9 @@ use drived_words::{
 
 /// The damaged frames that a report shows, the last ones.
 const SHOWN: usize = 12;
+
+/// Above what a drive from a file does not tell.
+const NOT_KNOWN: &str = "What nobody can know of these drives";
 
 /// The bytes of a frame that it shows.
 const LONGEST: usize = 24;
@@ -40,7 +44,20 @@ impl Diagnosis<'_> {
             }
         }
         lines.extend(self.words());
+        let unseen = self.not_known();
+        if !unseen.is_empty() {
+            lines.extend([String::new(), NOT_KNOWN.to_owned()]);
+            lines.extend(unseen.into_iter().map(|said| format!("  {said}")));
+        }
         lines
+    }
+
+    /// What nobody can know of the drives that are named, family by family.
+    pub(super) fn not_known(&self) -> Vec<String> {
+        let mut families: Vec<_> = self.seen.expected.iter().map(|name| name.family).collect();
+        families.dedup();
+        let said = |family: Family| family.not_known().iter().map(move |said| format!("{family}: {said}"));
+        families.into_iter().flat_map(said).collect()
     }
 
     /// The verdicts in words.
@@ -122,6 +139,11 @@ impl fmt::Display for Diagnosis<'_> {
         )?;
         section(f, "Verdicts")?;
         lines(f, &self.words())?;
+        let unseen = self.not_known();
+        if !unseen.is_empty() {
+            section(f, NOT_KNOWN)?;
+            lines(f, &unseen)?;
+        }
         let figures = self.figures();
         if !figures.is_empty() {
             section(f, "Questions")?;

@@ -134,10 +134,11 @@ pub(super) fn described(alike: &[Likeness]) -> String {
     match alike {
         [] => {
             // Nothing is found out by writing: what reads like others' drives is not guessed.
-            let mute = Family::all().iter().filter(|family| !family.tells_itself()).count();
-            let mute = match mute {
-                0 => String::new(),
-                mute => format!(" ({mute} families have nothing to be told by: drived families)"),
+            let mute = Family::all().into_iter().filter(|family| !family.tells_itself());
+            let mute: Vec<String> = mute.map(|family| family.to_string()).collect();
+            let mute = match &mute[..] {
+                [] => String::new(),
+                mute => format!(", unless one of those that nothing tells from others: {}", mute.join(", ")),
             };
             format!("a Modbus slave, and no drive of a family that is known here{mute}")
         }

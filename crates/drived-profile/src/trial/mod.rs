@@ -11,9 +11,10 @@ use std::{
     sync::Arc,
 };
 
+use drive_bus::Endpoint;
 use drive_core::{Frequency, SlaveAddress};
 use drive_families::Family;
-use drive_profile::{Profile, definition, shipped};
+use drive_profile::{Level, Profile, definition, shipped};
 
 use drived_client::own_line::{close, open_line_of};
 use drived_config::profiles::ProfilesError;
@@ -98,13 +99,21 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     let name = DriveName { family: family(tried), slave };
     let options = args.options.of(&[name])?;
     let config = line.config(&[name]).map_err(|error| Failure::Input(error.to_string()))?;
+    protocol.seen.extend(behind_a_pseudo_terminal(&config.endpoint));
     let opened = open_line_of(Some(name), config.clone()).await?;
     let mut console = Console::of_terminal();
     let steps = Steps { name, line: opened.clone(), config, options, lowest: args.lowest };
     let climbed = steps.climb(&mut console, &mut protocol.seen).await;
     close(&opened).await;
-    climbed?;
+    let is_started = climbed?;
     let (with, profile) = protocol.written_into(&text).map_err(Failure::Input)?;
+    let before = drive_profile::read(&text).map_or(profile.level(), |profile| profile.level());
+    if profile.level() == Level::Motion && before < Level::Motion && !is_started {
+        return Err(Failure::Drive(format!(
+            "{}: it stays at {before}, and nothing is signed: what lifts it to motion is a trial in which its motor was started and stopped",
+            profile.key()
+        )));
+    }
     output::say(format_args!("{}: it reaches {} now", profile.key(), profile.level()))?;
     match file {
         Some(file) => {
@@ -129,6 +138,16 @@ fn text(said: &str) -> Result<(String, Option<PathBuf>), Failure> {
     let read = fs::read_to_string(&file);
     let read = read.map_err(|error| ProfilesError::File { file: file.clone(), why: error.to_string() });
     Ok((read.map_err(|error| Failure::Input(error.to_string()))?, Some(file)))
+}
+
+/// What has to stand in the protocol of a drive that may be a simulated one.
+fn behind_a_pseudo_terminal(endpoint: &Endpoint) -> Option<String> {
+    let Endpoint::Serial(path) = endpoint else { return None };
+    let device = fs::canonicalize(path).ok()?;
+    device.starts_with("/dev/pts").then(|| {
+        "over a pseudo-terminal, behind which may be a simulated drive: that shows nothing of a real one"
+            .to_owned()
+    })
 }
 
 fn family(profile: Profile) -> Family {

@@ -10,7 +10,12 @@ use tokio::time::{Instant, sleep};
 
 use drived_client::own_line::{open_drive, wait_at_most, words};
 use drived_tools::commanded::Commanded;
-use drived_words::{drive_spec::DriveName, failure::Failure, signals::Ending};
+use drived_words::{
+    drive_spec::DriveName,
+    failure::Failure,
+    output::{self, Table},
+    signals::Ending,
+};
 
 use super::console::{Console, asked_to_end};
 
@@ -31,22 +36,25 @@ pub(super) struct Steps {
 }
 
 impl Steps {
-    /// Climbs as far as the profile lets, and notes what was seen.
+    /// Climbs as far as the profile lets, and notes what was seen. Whether the motor was started and stopped by it.
     ///
     /// # Errors
     /// A step was not right, or the drive does not answer: nothing further is done.
-    pub(super) async fn climb(&self, console: &mut Console, seen: &mut Vec<String>) -> Result<(), Failure> {
+    pub(super) async fn climb(&self, console: &mut Console, seen: &mut Vec<String>) -> Result<bool, Failure> {
         seen.push(self.read_all(console).await?);
         seen.push(self.watch_a_start(console).await?);
         let stops = !self.name.family.capabilities().stop_modes.is_empty();
         if !stops {
-            return console.say("the profile knows no stop: the trial ends here, with what was read");
+            console.say("the profile knows no stop: the trial ends here, with what was read")?;
+            return Ok(false);
         }
         // What listens to Ctrl-C while the drive is commanded ends its being the end of the program: so each question hears it from here.
         console.hear(Ending::listen_on_terminal()?);
         seen.push(self.test_the_stop(console).await?);
-        seen.extend(self.start_slowly(console).await?);
-        Ok(())
+        let started = self.start_slowly(console).await?;
+        let is_started = started.is_some();
+        seen.extend(started);
+        Ok(is_started)
     }
 
     /// 1. Everything that can be read, for a person who compares it with the panel.
@@ -55,22 +63,21 @@ impl Steps {
         let mut drive = self.drive();
         let status = drive.status().await.map_err(|error| self.failed(&error))?;
         console.say(format_args!("the drive shows {status}"))?;
-        let mut refused = 0;
+        let (mut refused, mut read) = (0, Table::texts());
         let rows = drive.capabilities().rows;
         for row in rows {
             if !row.access.is_readable() {
                 continue;
             }
             match drive.read_parameter(row).await {
-                Ok(word) => {
-                    console.say(format_args!("  {} = {} ({})", row.code, row.show(word), row.name))?;
-                }
+                Ok(word) => read.row([format!("  {}", row.code), row.show(word), row.name.to_owned()]),
                 Err(error) => {
                     refused += 1;
-                    console.say(format_args!("  {}: {error}", row.code))?;
+                    read.row([format!("  {}", row.code), "-".to_owned(), error.to_string()]);
                 }
             }
         }
+        output::say_table(read)?;
         self.agreed(console, "Does the panel show the same values, those of speed and current first?")
             .await?;
         Ok(match refused {
@@ -84,16 +91,18 @@ impl Steps {
 
     /// 2. A start from the panel, so that the states of the profile are seen before anything is written.
     async fn watch_a_start(&self, console: &mut Console) -> Result<String, Failure> {
+        console.say("")?;
         console
             .ask("2. Start the motor slowly at the panel, where that can be done safely; then press Enter")
             .await?;
         let mut drive = self.drive();
-        let running = self.until(&mut *drive, |status| status.motion == Motion::Driven).await?;
+        let running =
+            self.until(console, &mut *drive, "started", |status| status.motion == Motion::Driven).await?;
         console.say(format_args!("the drive shows {running}"))?;
         self.agreed(console, "Does the panel show the same speed, and does the motor turn that way?").await?;
         console.ask("Stop it at the panel; then press Enter").await?;
         let rests = |status: &Status| status.motion.is_undriven() || status.motion == Motion::Held;
-        let stands = self.until(&mut *drive, rests).await?;
+        let stands = self.until(console, &mut *drive, "stopped", rests).await?;
         console.say(format_args!("the drive shows {stands}"))?;
         self.agreed(console, "Does the motor stand?").await?;
         Ok("a start and a stop from the panel were seen in the states".to_owned())
@@ -101,6 +110,7 @@ impl Steps {
 
     /// 3. The stop, on a motor that somebody else has started.
     async fn test_the_stop(&self, console: &mut Console) -> Result<String, Failure> {
+        console.say("")?;
         console
             .ask(
                 "3. Give the command to the bus at the drive, and start the motor slowly by whatever starts it then (another \
@@ -123,6 +133,7 @@ impl Steps {
     /// 4. A start at the lowest speed, where the profile reaches motion.
     async fn start_slowly(&self, console: &mut Console) -> Result<Option<String>, Failure> {
         let key = self.name.family.capabilities().key;
+        console.say("")?;
         let confirmed = console
             .ask(format_args!(
                 "4. The motor is started by this program at {}. UNCOUPLE IT from its machine, see that nobody is near, and that \
@@ -178,20 +189,31 @@ impl Steps {
         Commanded::over(self.name, self.line.clone(), self.config.clone(), &self.options, Vec::new())
     }
 
-    /// Looks until a status is so.
-    async fn until(&self, drive: &mut dyn Drive, is_so: impl Fn(&Status) -> bool) -> Result<Status, Failure> {
-        let until = Instant::now() + AT_THE_PANEL;
+    /// Looks until a status is so; whoever was too early has it looked at again.
+    async fn until(
+        &self,
+        console: &mut Console,
+        drive: &mut dyn Drive,
+        what: &str,
+        is_so: impl Fn(&Status) -> bool,
+    ) -> Result<Status, Failure> {
+        let mut until = Instant::now() + AT_THE_PANEL;
         loop {
             let status = drive.status().await.map_err(|error| self.failed(&error))?;
             if is_so(&status) {
                 return Ok(status);
             }
             if Instant::now() >= until {
-                return Err(Failure::Drive(format!(
+                let why = format!(
                     "{}: it did not show within {AT_THE_PANEL:?}; the drive shows {status}: the states of the profile are not those \
-                     of this drive, or it was not started",
+                     of this drive, or it was not {what}",
                     self.name
-                )));
+                );
+                let again = "Press Enter to have it looked at again; anything else ends the trial";
+                if !console.ask(format_args!("{why}. {again}")).await?.is_empty() {
+                    return Err(Failure::Drive(why));
+                }
+                until = Instant::now() + AT_THE_PANEL;
             }
             sleep(LOOK).await;
         }

@@ -313,7 +313,7 @@ impl Asked {
             (self, job),
             (Start, Job::Start(_))
                 | (Stop, Job::Stop(_))
-                | (Setpoint, Job::SetSetpoint(_))
+                | (Setpoint, Job::SetSetpoint(..))
                 | (Reset, Job::ResetFaults)
                 | (Release, Job::Release)
                 | (Save, Job::Persist)

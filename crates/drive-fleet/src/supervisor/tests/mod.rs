@@ -248,7 +248,7 @@ impl Paper {
                 }
                 Reply::Ordered(self.status())
             }
-            Job::SetSetpoint(setpoint) => {
+            Job::SetSetpoint(setpoint, _) => {
                 if reached && self.obeys {
                     self.reference = Some(setpoint);
                     if self.status.state == State::Running {

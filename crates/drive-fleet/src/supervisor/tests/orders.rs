@@ -9,7 +9,10 @@ fn a_start_gives_the_setpoint_first_and_is_confirmed_at_the_reference() {
     rig.pass(500 * MS);
     assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
     let setpoint = Frequency::from_hertz(40).into();
-    assert_eq!(rig.drive.writes(), [Job::SetSetpoint(setpoint), Job::Start(Direction::Forward)]);
+    assert_eq!(
+        rig.drive.writes(),
+        [Job::SetSetpoint(setpoint, Some(Direction::Forward)), Job::Start(Direction::Forward)]
+    );
     assert!(rig.snapshot().started_here());
     assert_eq!(rig.snapshot().setpoint, Some(setpoint));
 }
@@ -26,7 +29,7 @@ fn a_start_goes_on_behind_a_setpoint_that_only_a_start_shows_and_behind_no_other
         let id = rig.order(run_at(40));
         rig.pass(500 * MS);
         assert_eq!(rig.outcome(id).is_some_and(Outcome::is_confirmed), starts, "{because}");
-        let mut writes = vec![Job::SetSetpoint(setpoint)];
+        let mut writes = vec![Job::SetSetpoint(setpoint, Some(Direction::Forward))];
         writes.extend(starts.then_some(Job::Start(Direction::Forward)));
         assert_eq!(rig.drive.writes(), writes, "{because}");
         // Alone it is what it is.
@@ -109,7 +112,7 @@ fn only_the_latest_setpoint_that_was_not_sent_is_sent() {
     assert_eq!(rig.outcome(ids[0]), Some(&Outcome::Refused(Refused::Superseded)));
     assert_eq!(rig.outcome(ids[1]), Some(&Outcome::Refused(Refused::Superseded)));
     assert_eq!(rig.outcome(ids[2]), Some(&Outcome::Confirmed));
-    assert_eq!(rig.drive.writes(), [Job::SetSetpoint(Frequency::from_hertz(40).into())]);
+    assert_eq!(rig.drive.writes(), [Job::SetSetpoint(Frequency::from_hertz(40).into(), None)]);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The referee beside a drive: everything that is written on the wire or happens around the machine is told to the manual, by its own
 //! transcription, which is asked then what it makes of the motor.
 
-use drive_core::registers::{Row, Storage};
+use drive_core::registers::{Place, Row, Space, Storage};
 use drive_drivecom::ChartState;
 use drive_sim::{Act, Intervened, Intervention, Observation, Panel, SimSlave};
 use tokio::time::Instant;
@@ -114,14 +114,19 @@ impl ByManual {
             }
             Intervention::Power(on) => vec![Change::Mains(on)],
             Intervention::Trip(code) => vec![Change::Trip(code), Change::CauseGone],
-            Intervention::Master(address, value) => vec![Change::Write { address, value }],
+            Intervention::Master(Place { space: Space::HoldingRegister, address }, value) => {
+                vec![Change::Write { address, value }]
+            }
             // A setting is one whoever makes it.
-            Intervention::Set(address, value)
-                if self.rows.iter().any(|row| row.address == address && is_setting(row)) =>
+            Intervention::Set(place @ Place { space: Space::HoldingRegister, address }, value)
+                if self.rows.iter().any(|row| row.place() == place && is_setting(row)) =>
             {
                 vec![Change::Write { address, value }]
             }
-            Intervention::Panel(Panel::Reset) | Intervention::Set(..) | Intervention::World(_) => {
+            Intervention::Panel(Panel::Reset)
+            | Intervention::Master(..)
+            | Intervention::Set(..)
+            | Intervention::World(_) => {
                 return None;
             }
         })

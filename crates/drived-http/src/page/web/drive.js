@@ -9,7 +9,7 @@ import { MISSING, old, quantity } from './format.js';
 import { givenBy, lastSetpoint } from './given.js';
 import { age, plant, quality, takeDrive } from './plant.js';
 import { named, t } from './texts.js';
-import { told } from './told.js';
+import { langOf, told } from './told.js';
 import { trend } from './trend.js';
 import { trouble } from './trouble.js';
 import { word } from './vocabulary.js';
@@ -100,7 +100,7 @@ export function drive(root, name) {
     const unseen = shown.not_known ?? [];
     notKnown.hidden = !unseen.length;
     const unseenNow = unseen.join('\n');
-    if (unseenNow !== unseenBefore) gaps.replaceChildren(...unseen.map(one => el('li', { lang: 'en' }, told(one))));
+    if (unseenNow !== unseenBefore) gaps.replaceChildren(...unseen.map(one => el('li', langOf(one), told(one))));
     unseenBefore = unseenNow;
     BIG.forEach(([, value, of], index) => {
       const group = groupOf(of);

@@ -118,7 +118,7 @@ async function readParameters(name, place) {
 function parameterRow(name, row) {
   const value = el('td.right', {}, valueText(row));
   const differs = row.factory && row.text !== undefined && row.text !== row.factory && String(row.value) !== row.factory;
-  const line = el('tr', {}, el('th', { scope: 'row' }, `${row.mnemonic} ${row.address}`), el('td', {}, row.name, row.range ? el('small', {}, ` ${row.range}`) : null),
+  const line = el('tr', {}, el('th', { scope: 'row' }, `${row.mnemonic} ${row.space ? `${word(row.space)} ` : ''}${row.address}`), el('td', {}, row.name, row.range ? el('small', {}, ` ${row.range}`) : null),
     value, el('td', {}, row.factory, differs ? el('b', {}, ` · ${t('differs')}`) : null), el('td', {}, word(row.access)));
   if (!plant.daemon.rights.engineer || !mayCommand(plant.drives.get(name) ?? { name }) || row.access === 'read') return line;
   const field = el('input.small', { value: row.value ?? '', 'aria-label': row.mnemonic });

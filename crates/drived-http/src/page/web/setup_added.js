@@ -6,7 +6,7 @@ import { old, MISSING } from './format.js';
 import { ofDrive } from './place.js';
 import { age, plant, quality } from './plant.js';
 import { t } from './texts.js';
-import { told } from './told.js';
+import { langOf, told } from './told.js';
 import { trouble } from './trouble.js';
 import { frequencyText, stateWord } from './words.js';
 
@@ -85,7 +85,7 @@ export function addedPanel(change) {
       const to = !isControlled;
       const unseen = plant.drives.get(name)?.not_known ?? [];
       const doubts = to ? [guessed && el('p.remark', {}, t('setup_confirm_guess', { family: guessed, file })),
-        ...(unseen.length ? [el('p', {}, t('not_known_of')), el('ul.history', {}, ...unseen.map(one => el('li', { lang: 'en' }, told(one))))] : [])].filter(Boolean) : [];
+        ...(unseen.length ? [el('p', {}, t('not_known_of')), el('ul.history', {}, ...unseen.map(one => el('li', langOf(one), told(one))))] : [])].filter(Boolean) : [];
       const shown = doubts.length ? el('div', {}, ...doubts) : undefined;
       if (!await confirmed([name], t(to ? 'setup_confirm_control' : 'setup_confirm_give', { drive: name }), button.textContent, shown)) return;
       button.disabled = true;

@@ -19,6 +19,11 @@ export function told(text) {
   return text && language() === 'fr' && french ? french.sentence(text) : text ?? '';
 }
 
+/** Its language, as an attribute, where that is not the page's. */
+export function langOf(text) {
+  return language() !== 'en' && told(text) === text ? { lang: 'en' } : {};
+}
+
 /** What a line has found wrong: its sentence, from what it cannot be told, and what to do next; in the language `lang`. */
 export function foundWords(finding) {
   const known = language() === 'fr' && french?.finding(finding);

@@ -22,6 +22,10 @@ const WORDS = {
   'output_off,_the_shaft_may_coast': ['output off, the shaft may coast', 'sortie coupée, l’arbre peut encore tourner'],
   at_rest: ['at rest', 'à l’arrêt'],
   not_known: ['not known', 'inconnu'],
+  // Where a register stands that is no holding register.
+  coil: ['coil', 'bobine'],
+  discrete_input: ['discrete input', 'entrée TOR'],
+  input_register: ['input register', 'registre d’entrée'],
   // Links.
   connecting: ['Connecting', 'Connexion'],
   connected: ['Connected', 'Raccordé'],
