@@ -95,11 +95,17 @@ async fn linuxcnc_runs_turns_round_stops_and_resets_a_simulated_vf_s15() {
 #[tokio::test(flavor = "multi_thread")]
 async fn linuxcnc_runs_turns_round_stops_and_resets_a_simulated_gs2() {
     let Some(folder) = folder() else { return };
-    let others: String = [0x2100, 0x2104, 0x2105, 0x2106, 0x2107, 0x2108, 0x2109, 0x210A, 0x210B, 0x210C]
-        .map(|address| {
-            format!("[register.W{address:04X}]\nwhat = \"another\"\naddress = {address}\naccess = \"read\"\nsource = \"linuxcnc\"\n\n")
-        })
-        .concat();
+    let register = |address: u16, access: &str| {
+        format!(
+            "[register.W{address:04X}]\nwhat = \"another\"\naddress = {address}\naccess = {access}\nsource = \"linuxcnc\"\n\n"
+        )
+    };
+    let read = [0x2100, 0x2104, 0x2105, 0x2106, 0x2107, 0x2108, 0x2109, 0x210A, 0x210B, 0x210C];
+    let read = read.map(|address| register(address, "\"read\"")).concat();
+    // The way of its stop, both ramps, and the stall prevention: it sets them when it begins.
+    let set = [0x0100, 0x0101, 0x0102, 0x0605];
+    let others =
+        read + &set.map(|address| register(address, "\"read_write\"\nstorage = \"unknown\"")).concat();
     let bench = Bench::of_text(
         "gs4",
         "9600 8N1",
@@ -113,22 +119,22 @@ async fn linuxcnc_runs_turns_round_stops_and_resets_a_simulated_gs2() {
     let load = format!("loadusr -W gs2_vfd --device {} --rate 9600 --parity none", bench.port.display());
     let mut hal = Hal::start(&folder, &load).await;
     let pin = |name: &str| format!("gs2_vfd.{name}");
-    // 1800 rpm at 60 Hz, as it takes a motor for.
+    hal.set(&pin("nameplate-HZ"), "60").await;
+    hal.set(&pin("nameplate-RPM"), "1800").await;
     hal.set(&pin("speed-command"), "900").await;
     hal.set(&pin("spindle-fwd"), "1").await;
-    hal.set(&pin("spindle-on"), "1").await;
+    bench.nudged(&mut hal, &pin("spindle-on"), "1", |seen| seen.running).await;
     bench.until("30 Hz forward", |seen| seen.output_frequency == 3_000).await;
     hal.until(&pin("at-speed"), "TRUE").await;
-    hal.set(&pin("spindle-fwd"), "0").await;
+    bench.nudged(&mut hal, &pin("spindle-fwd"), "0", |seen| seen.setpoint == -3_000).await;
     bench.until("30 Hz in reverse", |seen| seen.output_frequency == -3_000).await;
     hal.set(&pin("speed-command"), "600").await;
     bench.until("20 Hz in reverse", |seen| seen.output_frequency == -2_000).await;
-    hal.set(&pin("spindle-on"), "0").await;
+    bench.nudged(&mut hal, &pin("spindle-on"), "0", |seen| seen.setpoint == 0).await;
     bench.until("rest", |seen| !seen.running && seen.shaft_frequency == 0).await;
     hal.until(&pin("is-stopped"), "TRUE").await;
     bench.machine.trip(9);
-    hal.set(&pin("err-reset"), "1").await;
-    bench.until("the reset", |seen| seen.trip.is_none()).await;
+    bench.nudged(&mut hal, &pin("err-reset"), "1", |seen| seen.trip.is_none()).await;
     assert!(!bench.machine.observe().running, "a reset is no start");
     hal.end().await;
 }
@@ -222,6 +228,23 @@ impl Bench {
         let port = env::temp_dir().join(format!("drived-linuxcnc-{key}-{}", std::process::id()));
         let serving = line.serve_pty(&port).expect("a pty can be had");
         Self { port, machine, _serving: serving }
+    }
+
+    /// Until the drive is so by a switch that is thrown. `gs2_vfd` writes what has changed once, and takes it for done whatever came of that: on a
+    /// busy machine it is thrown back and again.
+    async fn nudged(&self, hal: &mut Hal, pin: &str, value: &str, is_so: impl Fn(&Observation) -> bool) {
+        const TURNS: Duration = Duration::from_secs(5);
+        let nudges = timeout(PATIENCE, async {
+            loop {
+                hal.set(pin, value).await;
+                if timeout(TURNS, self.machine.wait_until(&is_so)).await.is_ok() {
+                    break;
+                }
+                hal.set(pin, if value == "0" { "1" } else { "0" }).await;
+                sleep(TURNS).await;
+            }
+        });
+        assert!(nudges.await.is_ok(), "{pin} is never obeyed: {:?}", self.machine.observe());
     }
 
     async fn until(&self, what: &str, is_so: impl Fn(&Observation) -> bool) {
