@@ -22,12 +22,11 @@ use drive_bus::{
     pdu,
 };
 use drive_core::serial::SerialSettings;
-use fastrand::Rng;
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
 use crate::{
-    fuzz::{change, spoken},
+    fuzz::{Source, change, spoken},
     report::{Find, Plant, Told},
 };
 
@@ -76,11 +75,11 @@ struct Case {
 }
 
 fn cases(seed: u64, count: u64, peer: Peer) -> Vec<Case> {
-    let mut rng = Rng::with_seed(seed);
+    let mut rng = Source::seeded(seed);
     (0..count).map(|_| a_case(&mut rng, peer)).collect()
 }
 
-fn a_case(rng: &mut Rng, peer: Peer) -> Case {
+fn a_case(rng: &mut Source, peer: Peer) -> Case {
     let answered: [(Request<'static>, &[u8]); 6] = [
         (Request::ReadHoldingRegisters(0x6B, 3), &[3, 6, 2, 0x2B, 0, 0, 0, 0x64]),
         (Request::ReadHoldingRegisters(3201, 1), &[3, 2, 2, 0x40]),

@@ -3,7 +3,7 @@
 #![forbid(unsafe_code)]
 
 use std::{
-    env, io,
+    env, fs, io,
     path::{Path, PathBuf},
     process::{self, ExitCode},
     thread,
@@ -56,13 +56,16 @@ enum Part {
         /// For so many seconds each.
         #[arg(long, default_value_t = 5)]
         seconds: u64,
-        /// One target alone, with `--execution`.
-        #[arg(long, requires = "execution")]
+        /// One target alone.
+        #[arg(long)]
         target: Option<String>,
-        /// One execution alone, as a find names it.
+        /// One execution of it alone, as a find names it.
         #[arg(long, requires = "target")]
         execution: Option<u64>,
-        /// Against its planted defects; those in the line need `--features plants`.
+        /// One execution by the bytes of a file, whoever has chosen them.
+        #[arg(long, requires = "target", conflicts_with = "execution")]
+        bytes: Option<PathBuf>,
+        /// Against its planted defects; those in the line and the fleet need `--features plants`.
         #[arg(long)]
         plants: bool,
     },
@@ -220,17 +223,28 @@ fn main() -> ExitCode {
             vec![matrix::find_plants(seed, of_each as usize, only)]
         }
         Part::Matrix { of_each, .. } => vec![matrix::run(seed, of_each, go_on)],
-        Part::Fuzz { target: Some(name), execution: Some(number), .. } => {
-            let known = fuzz::Target::ALL.into_iter().find(|known| format!("{known:?}") == name);
-            let Some(target) = known else {
-                eprintln!("{name} is no target: {:?}", fuzz::Target::ALL);
+        Part::Fuzz { plants: true, .. } => fuzz::hunts(seed),
+        Part::Fuzz { target, execution, bytes, seconds, .. } => {
+            let known =
+                |name: &String| fuzz::Target::ALL.into_iter().find(|known| format!("{known:?}") == *name);
+            let only = target.as_ref().and_then(known);
+            if target.is_some() && only.is_none() {
+                eprintln!("it is none of {:?}", fuzz::Target::ALL);
                 return ExitCode::FAILURE;
+            }
+            let once = match (only, execution, bytes.map(fs::read).transpose()) {
+                (_, _, Err(error)) => return ended(Err(error)),
+                (Some(target), Some(number), _) => Some(target.execute(number)),
+                (Some(target), None, Ok(Some(bytes))) => Some(target.execute_on(&bytes)),
+                _ => None,
             };
-            println!("{:?}", target.execute(number));
-            return ExitCode::SUCCESS;
+            if let Some(held) = once {
+                println!("{held:?}");
+                return ended(held.map_err(io::Error::other));
+            }
+            let targets = only.map_or(fuzz::Target::ALL.to_vec(), |only| vec![only]);
+            vec![fuzz::run(&targets, seed, Duration::from_secs(seconds), go_on)]
         }
-        Part::Fuzz { plants: true, .. } => vec![fuzz::find_plants(seed, 20_000)],
-        Part::Fuzz { seconds, .. } => vec![fuzz::run(seed, Duration::from_secs(seconds), go_on)],
         Part::Program { plants: true, .. } => vec![program::find_plants()],
         Part::Program { program, seconds, target, execution, mbusd, .. } => {
             let known =

@@ -1,5 +1,6 @@
 //! Days of a plant in virtual time: many lines full of drives of every family, a fault every few seconds, commands all the time. Whatever
-//! the fleet tells is held against the machines; each command ends, a stop within its time; memory does not grow with the days.
+//! the fleet tells is held against the machines; each command ends, a stop within its time; what is only watched is never written, what
+//! its owner's limits forbid is never taken, and what runs when the fleet ends is stopped by it; memory does not grow with the days.
 
 use std::{
     collections::BTreeMap,
@@ -12,8 +13,8 @@ use std::{
 use drive_bus::{Line, LineConfig};
 use drive_core::{Direction, Frequency, SerialSettings, StopMode, serial::CharacterFormat};
 use drive_families::{Family, SetUp};
-use drive_fleet::{DriveHandle, DriveSettings, Fleet, Outcome};
-use drive_sim::{Breach, Fault, Faults, SimLine, Wiring};
+use drive_fleet::{DriveHandle, DriveSettings, Fleet, FrequencyLimits, Outcome};
+use drive_sim::{Breach, Fault, Faults, SimLine, SimSlave, Wiring};
 use drive_testing::{contract::Open, witness::Witnesses};
 use fastrand::Rng;
 use tokio::time::{Instant, sleep};
@@ -29,6 +30,8 @@ const EVERY: Duration = Duration::from_secs(3);
 const LONGEST: Duration = Duration::from_secs(240);
 /// What a plant may need more at its end than after a tenth of its time.
 const GROWTH: u64 = 48 * 1024;
+/// What the owner of each third drive allows at the most; commands go up to 45 Hz.
+const LIMIT: Frequency = Frequency::from_hertz(38);
 
 /// What became of the commands.
 #[derive(Debug, Default)]
@@ -38,6 +41,7 @@ struct Kept {
     given: u64,
     told: u64,
     late: Vec<String>,
+    passed: Vec<String>,
 }
 
 /// So many lines with so many drives each, for so long.
@@ -136,11 +140,19 @@ async fn live(
         let line = Line::over(simulated.in_memory(), LineConfig::stream(settings));
         let name = format!("line {number}");
         builder = builder.line(name.clone(), line);
-        for address in 1..=size.drives {
-            let family = Family::BUILT_IN[usize::from(address) % Family::BUILT_IN.len()];
+        // The last one is commanded like every other, and only watched.
+        for address in 1..=size.drives + 1 {
+            let in_turn = Family::BUILT_IN[usize::from(address) % Family::BUILT_IN.len()];
+            // Which takes any address.
+            let family = if address <= size.drives { in_turn } else { Family::ATV312 };
             let machine = family.machine(SetUp::ForTheBus).expect("it has a twin");
             simulated.add_boxed(address, machine).expect("the address is free");
-            let drive = DriveSettings::controlled(format!("{number}/{address}"));
+            let high = (address % 3 == 1).then_some(LIMIT);
+            let drive = DriveSettings {
+                control: address <= size.drives,
+                limits: FrequencyLimits { high, ..FrequencyLimits::default() },
+                ..DriveSettings::watched(format!("{number}/{address}"))
+            };
             builder = builder.drive(&name, address, drive, |port, slave| open(family)(Box::new(port), slave));
         }
         simulated.set_faults(faults(rng.u64(..)));
@@ -174,21 +186,39 @@ async fn live(
     for stop in stops {
         *ends.entry(word(&stop.finished().await)).or_default() += 1;
     }
-    told.details.push(format!("at the end each is stopped: {ends:?}"));
     sleep(LONGEST).await;
     let end = memory();
+    // The first of each line runs when the fleet ends.
+    let machines: Vec<SimSlave> = sites.iter().filter_map(|(_, simulated)| simulated.slave(1)).collect();
+    let first = |drive: &&DriveHandle| drive.slave().number() == 1;
+    let starts: Vec<_> =
+        fleet.drives().iter().filter(first).map(|drive| drive.run(Direction::Forward, LIMIT)).collect();
+    for start in starts {
+        *ends.entry(word(&start.finished().await)).or_default() += 1;
+    }
     drop(fleet.shutdown(Duration::from_secs(60)).await);
+    sleep(LONGEST).await;
     let kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
     for (what, count) in &kept.outcomes {
         told.count_as(*what, *count);
     }
+    told.details.push(format!("at the end each is stopped, and one of each line started: {ends:?}"));
     told.details.push(format!("longest stop until it was told: {:.1} s", kept.longest_stop.as_secs_f64()));
     let mut find = |what: String| told.finds.push(Find { what, replay: size.replay(seed) });
     if kept.told != kept.given {
         find(format!("{} of {} commands were told", kept.told, kept.given));
     }
-    kept.late.iter().take(4).for_each(|late| find(late.clone()));
+    kept.late.iter().chain(&kept.passed).take(4).for_each(|what| find(what.clone()));
+    for machine in machines.iter().filter(|machine| machine.observe().output_frequency != 0) {
+        find(format!("{} runs behind the end of the fleet that has started it", machine.name()));
+    }
     for (name, simulated) in &sites {
+        let watched = simulated.slave(size.drives + 1);
+        let writes = watched
+            .map_or(0, |machine| [0x06, 0x10].iter().map(|function| machine.requests(*function)).sum());
+        if writes > 0 {
+            find(format!("{writes} writes to the drive of {name} that is only watched"));
+        }
         // An answer that comes late on purpose meets whoever speaks then.
         let is_ours = |breach: &Breach| !matches!(breach, Breach::Collision { late: true, .. });
         if let Some(first) = simulated.violations().iter().map(|one| one.breach).find(is_ours) {
@@ -226,6 +256,7 @@ fn command(rng: &mut Rng, drive: &DriveHandle, kept: &Arc<Mutex<Kept>>) {
     kept.lock().unwrap_or_else(PoisonError::into_inner).given += 1;
     let drive = drive.clone();
     let order = rng.u8(..8);
+    let is_too_fast = drive.settings().limits.high.is_some_and(|high| frequency > high);
     drop(tokio::spawn(async move {
         let outcome = match order {
             _ if is_stop => drive.stop(StopMode::Ramp).finished().await,
@@ -240,6 +271,9 @@ fn command(rng: &mut Rng, drive: &DriveHandle, kept: &Arc<Mutex<Kept>>) {
         if is_stop {
             kept.longest_stop = kept.longest_stop.max(took);
         }
+        if is_too_fast && !is_stop && order != 4 && outcome.is_confirmed() {
+            kept.passed.push(format!("{name}: {frequency} was taken, and {LIMIT} is the most"));
+        }
         if took > LONGEST {
             kept.late.push(format!("{name}: told after {took:?}: {outcome}"));
         }
@@ -248,7 +282,7 @@ fn command(rng: &mut Rng, drive: &DriveHandle, kept: &Arc<Mutex<Kept>>) {
 
 const fn word(outcome: &Outcome) -> &'static str {
     match outcome {
-        Outcome::Confirmed | Outcome::Stopped(_) => "confirmed",
+        Outcome::Confirmed | Outcome::Started(_) | Outcome::Stopped(_) => "confirmed",
         Outcome::Refused(_) => "refused",
         Outcome::NotConfirmed(_) => "not confirmed",
         Outcome::OutcomeUnknown(_) => "outcome unknown",

@@ -106,3 +106,16 @@ fn a_slave_that_was_heard_late_has_its_pause_before_it_is_asked_or_probed() {
         }
     }
 }
+
+/// An answer that was damaged, or cut off by a stop, came from its slave as every other.
+#[test]
+fn a_slave_whose_answer_was_damaged_has_its_pause_before_a_stop() {
+    use Step::{Answer, Command, Damage, Lose, Read, Refuse, Stop, Wait};
+
+    for (setting, steps) in [
+        (Setting::Gateway, &[Read, Refuse, Stop, Lose, Damage, Stop][..]),
+        (Setting::Wire, &[Command, Wait, Wait, Wait, Wait, Answer, Wait, Damage, Stop]),
+    ] {
+        assert_eq!(lives(setting, steps), Ok(()), "{setting:?}: {steps:?}");
+    }
+}

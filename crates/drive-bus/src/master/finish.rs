@@ -230,7 +230,11 @@ impl<C> Master<C> {
         if matches!(failure, Failure::Damaged(_) | Failure::Mismatch(_)) {
             self.offline.missed_again(now, flight.slave, self.config.probe_backoff);
         }
+        let heard_until = self.quiet_from;
         let Some(station) = self.stations.get_mut(&flight.slave) else { return };
+        if !matches!(failure, Failure::Timeout | Failure::Nobody) {
+            station.spoke(heard_until);
+        }
         match failure {
             Failure::Damaged(_) => {
                 station.stats.outcomes.damaged += 1;

@@ -368,6 +368,12 @@ impl<C> Master<C> {
         self.record.ended(now, flight.slave, flight.started, Ending::GivenUp);
         self.fear_late_answer(now, flight);
         self.owe(flight);
+        // Whatever came behind the request, damaged or cut off here, was its slave's.
+        let sent = flight.sent.map(|sent| sent.end);
+        let heard = self.heard.map(|(_, until)| until);
+        if let Some(until) = heard.filter(|until| sent.is_some_and(|sent| *until > sent)) {
+            self.station(flight.slave).spoke(until);
+        }
         if !matches!(flight.purpose, Purpose::Probe) {
             self.fresh.in_vain(now);
         }

@@ -123,7 +123,12 @@ impl Station {
     /// An answer came when its time was over: it is there, and slow, and needs its pause.
     pub(super) fn heard_late(&mut self, now: Instant) {
         self.slow = true;
-        self.ready_at = self.ready_at.max(Some(now + self.settings.turnaround));
+        self.spoke(now);
+    }
+
+    /// What came until then, and was no answer, may have been its own: it needs its pause all the same.
+    pub(super) fn spoke(&mut self, until: Instant) {
+        self.ready_at = self.ready_at.max(Some(until + self.settings.turnaround));
     }
 
     /// Whether only a long question is worth asking, because its own time was set or because it was heard late.

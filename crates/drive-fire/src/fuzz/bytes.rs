@@ -1,7 +1,8 @@
 //! Bytes that look like what a line carries more often than chance makes them.
 
 use drive_bus::exchange::{ascii, rtu};
-use fastrand::Rng;
+
+use super::source::Source;
 
 /// PDUs that manuals and the specification print: requests, answers, refusals (MODBUS Application Protocol V1.1b3, section 6;
 /// BBV51701; VVDED397054 p. 24; guide d'exploitation Altivar 21).
@@ -28,7 +29,7 @@ pub(super) const PDUS: &[&[u8]] = &[
 ];
 
 /// A PDU, as printed or changed.
-pub(super) fn pdu(rng: &mut Rng) -> Vec<u8> {
+pub(super) fn pdu(rng: &mut Source) -> Vec<u8> {
     let mut pdu = PDUS[rng.usize(..PDUS.len())].to_vec();
     if rng.bool() {
         change(rng, &mut pdu);
@@ -41,7 +42,7 @@ pub(super) fn pdu(rng: &mut Rng) -> Vec<u8> {
 }
 
 /// One to four changes, each of a kind that finds something somewhere.
-pub(crate) fn change(rng: &mut Rng, bytes: &mut Vec<u8>) {
+pub(crate) fn change(rng: &mut Source, bytes: &mut Vec<u8>) {
     for _ in 0..rng.usize(1..5) {
         let at = rng.usize(..=bytes.len());
         match rng.u8(..7) {
@@ -65,7 +66,7 @@ pub(crate) fn change(rng: &mut Rng, bytes: &mut Vec<u8>) {
 }
 
 /// Pieces of a stream of one protocol: whole frames, changed frames, their parts, noise.
-pub(super) fn pieces(rng: &mut Rng, frame: impl Fn(&mut Rng, u8, &[u8]) -> Vec<u8>) -> Vec<Vec<u8>> {
+pub(super) fn pieces(rng: &mut Source, frame: impl Fn(&mut Source, u8, &[u8]) -> Vec<u8>) -> Vec<Vec<u8>> {
     (0..rng.usize(..10))
         .map(|_| {
             let (slave, pdu) = (rng.u8(1..4), pdu(rng));
@@ -81,16 +82,16 @@ pub(super) fn pieces(rng: &mut Rng, frame: impl Fn(&mut Rng, u8, &[u8]) -> Vec<u
         .collect()
 }
 
-pub(super) fn rtu_frame(_: &mut Rng, slave: u8, pdu: &[u8]) -> Vec<u8> {
+pub(super) fn rtu_frame(_: &mut Source, slave: u8, pdu: &[u8]) -> Vec<u8> {
     rtu::frame(slave, pdu).to_vec()
 }
 
-pub(super) fn ascii_frame(_: &mut Rng, slave: u8, pdu: &[u8]) -> Vec<u8> {
+pub(super) fn ascii_frame(_: &mut Source, slave: u8, pdu: &[u8]) -> Vec<u8> {
     ascii::frame(slave, pdu, b'\n').to_vec()
 }
 
 /// What stands on a UNI-TELWAY line: a poll, a byte that says yes, no or nothing, a data frame with the network header.
-pub(super) fn telway_frame(rng: &mut Rng, slave: u8, pdu: &[u8]) -> Vec<u8> {
+pub(super) fn telway_frame(rng: &mut Source, slave: u8, pdu: &[u8]) -> Vec<u8> {
     match rng.u8(..5) {
         0 => vec![[0x06, 0x15, 0x04][rng.usize(..3)]],
         1 => drive_unitelway_poll(slave),

@@ -16,7 +16,6 @@ use drive_bus::{
     protocol::UniTelwaySettings,
 };
 use drive_core::serial::SerialSettings;
-use fastrand::Rng;
 use tokio::time::Instant;
 use tokio_modbus::{Request, Response};
 
@@ -24,6 +23,7 @@ use super::{
     Target,
     broken::{Broken, Defect},
     bytes::{ascii_frame, pieces, rtu_frame, telway_frame},
+    source::Source,
 };
 
 const MS: Duration = Duration::from_millis(1);
@@ -42,7 +42,7 @@ fn machine(target: Target) -> Box<dyn Machine> {
     }
 }
 
-fn a_request(rng: &mut Rng, target: Target) -> Request<'static> {
+fn a_request(rng: &mut Source, target: Target) -> Request<'static> {
     let requests = [
         Request::ReadHoldingRegisters(3201, 4),
         Request::ReadHoldingRegisters(3201, 1),
@@ -56,7 +56,7 @@ fn a_request(rng: &mut Rng, target: Target) -> Request<'static> {
     requests.into_iter().nth(rng.usize(..count)).unwrap_or(Request::ReadHoldingRegisters(0, 1))
 }
 
-pub(super) fn execute(target: Target, rng: &mut Rng, defect: Option<Defect>) -> Result<(), String> {
+pub(super) fn execute(target: Target, rng: &mut Source, defect: Option<Defect>) -> Result<(), String> {
     let mut machine = machine(target);
     if let Some(defect) = defect {
         machine = Box::new(Broken::new(machine, defect));
@@ -71,7 +71,7 @@ pub(super) fn execute(target: Target, rng: &mut Rng, defect: Option<Defect>) -> 
 /// One exchange in the midst of anything; when it is over.
 fn exchange(
     target: Target,
-    rng: &mut Rng,
+    rng: &mut Source,
     machine: &mut dyn Machine,
     begun: Instant,
 ) -> Result<Instant, String> {

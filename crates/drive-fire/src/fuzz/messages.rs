@@ -6,10 +6,9 @@ use drived_words::{
     line_spec::LineSpec,
     object::Object,
 };
-use fastrand::Rng;
 use serde_json::Value;
 
-use super::bytes::change;
+use super::{bytes::change, source::Source};
 
 /// Commands as the README of `drived` has them, and what is wrong in a way of its own.
 const COMMANDS: &[&str] = &[
@@ -23,7 +22,7 @@ const COMMANDS: &[&str] = &[
 ];
 
 /// The common reader and ours say the same of any bytes; what stands twice is seen, and the last of it counts for both.
-pub(super) fn json(rng: &mut Rng) -> Result<(), String> {
+pub(super) fn json(rng: &mut Source) -> Result<(), String> {
     let mut text = COMMANDS[rng.usize(..COMMANDS.len())].as_bytes().to_vec();
     if rng.u8(..16) == 0 {
         let depth = rng.usize(1..400);
@@ -48,8 +47,8 @@ pub(super) fn json(rng: &mut Rng) -> Result<(), String> {
 }
 
 /// A payload that was changed is one, within its bounds, or is refused; what is read is written as what was read.
-pub(super) fn sparkplug(rng: &mut Rng) -> Result<(), String> {
-    let metric = |rng: &mut Rng| Metric {
+pub(super) fn sparkplug(rng: &mut Source) -> Result<(), String> {
+    let metric = |rng: &mut Source| Metric {
         name: rng.bool().then(|| "Control/Setpoint".to_owned()),
         alias: rng.bool().then(|| rng.u64(..)),
         data_type: Some(rng.u32(..40)),
@@ -79,7 +78,7 @@ pub(super) fn sparkplug(rng: &mut Rng) -> Result<(), String> {
 }
 
 /// Drives and lines as a command line has them are read or refused in words.
-pub(super) fn specs(rng: &mut Rng) -> Result<(), String> {
+pub(super) fn specs(rng: &mut Source) -> Result<(), String> {
     const SPECS: &[&str] = &[
         "atv312@1-31",
         "3g3ev@2,4,7-9",

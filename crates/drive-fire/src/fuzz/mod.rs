@@ -1,11 +1,15 @@
-//! Fuzzing: honest loops over whatever takes bytes or text from outside, from corpora of frames that manuals print. No coverage guides
-//! them; each target has something to hold what comes out against, besides that nothing panics and everything ends.
+//! Fuzzing: honest loops over whatever takes bytes, texts or orders of events from outside, from corpora of frames that manuals print.
+//! Each target has something to hold what comes out against, besides that nothing panics and everything ends. The numbers of an
+//! execution are those of a seed, or bytes of a file.
 
 mod broken;
 mod bytes;
 mod machines;
 mod messages;
+mod orders;
 mod readers;
+mod source;
+mod supervisor;
 
 use std::{
     collections::BTreeMap,
@@ -13,12 +17,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use fastrand::Rng;
-
 use crate::report::{Find, Plant, Told};
 use broken::Defect;
 pub(crate) use bytes::change;
 pub(crate) use machines::spoken;
+pub use source::Source;
 
 /// What is fuzzed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,11 +50,17 @@ pub enum Target {
     Sparkplug,
     /// Drives and lines of a command line.
     Specs,
+    /// The master of a line, by what is asked of it and what becomes of that.
+    Schedule,
+    /// The same with what it knows of a gateway.
+    FarEnd,
+    /// Whoever looks after a drive, by what the drive replies.
+    Supervisor,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 15] = [
         Self::Rtu,
         Self::Ascii,
         Self::Mbap,
@@ -64,6 +73,9 @@ impl Target {
         Self::Json,
         Self::Sparkplug,
         Self::Specs,
+        Self::Schedule,
+        Self::FarEnd,
+        Self::Supervisor,
     ];
 
     /// One execution with the numbers of a seed.
@@ -71,11 +83,18 @@ impl Target {
     /// # Errors
     /// What does not hold.
     pub fn execute(self, seed: u64) -> Result<(), String> {
-        self.execute_with(seed, None)
+        self.execute_with(Source::seeded(seed), None)
     }
 
-    fn execute_with(self, seed: u64, defect: Option<Defect>) -> Result<(), String> {
-        let mut rng = Rng::with_seed(seed);
+    /// One execution with the numbers that these bytes are.
+    ///
+    /// # Errors
+    /// What does not hold.
+    pub fn execute_on(self, bytes: &[u8]) -> Result<(), String> {
+        self.execute_with(Source::of(bytes), None)
+    }
+
+    fn execute_with(self, mut rng: Source, defect: Option<Defect>) -> Result<(), String> {
         let run = panic::AssertUnwindSafe(|| match self {
             Self::Rtu | Self::Ascii | Self::Mbap | Self::UniTelway => {
                 machines::execute(self, &mut rng, defect)
@@ -88,6 +107,9 @@ impl Target {
             Self::Json => messages::json(&mut rng),
             Self::Sparkplug => messages::sparkplug(&mut rng),
             Self::Specs => messages::specs(&mut rng),
+            Self::Schedule => orders::schedule(&mut rng),
+            Self::FarEnd => orders::far_end(&mut rng),
+            Self::Supervisor => supervisor::execute(rng),
         });
         panic::catch_unwind(run).unwrap_or_else(|panic| {
             let said = panic.downcast_ref::<String>().cloned();
@@ -97,16 +119,20 @@ impl Target {
     }
 }
 
-/// Fuzzes each target for so long.
-pub fn run(seed: u64, of_each: Duration, mut go_on: impl FnMut() -> bool) -> Told {
+/// Fuzzes each of these targets for so long.
+pub fn run(targets: &[Target], seed: u64, of_each: Duration, mut go_on: impl FnMut() -> bool) -> Told {
     let begun = Instant::now();
     let mut told = Told::new("fuzzing", "executions");
-    for target in Target::ALL {
+    for target in targets {
         let (began, mut count, mut whys) = (Instant::now(), 0, BTreeMap::new());
         while began.elapsed() < of_each && go_on() {
             let number = seed.wrapping_mul(1_000_000_007).wrapping_add(count);
             count += 1;
             if let Err(why) = target.execute(number) {
+                if why.starts_with("open: ") {
+                    told.count_as(format!("{target:?}: what is open"), 1);
+                    continue;
+                }
                 // One of each kind: what follows the first words is its data.
                 let kind: String = why.chars().take(40).collect();
                 whys.entry(kind).or_insert((number, why));
@@ -123,6 +149,21 @@ pub fn run(seed: u64, of_each: Duration, mut go_on: impl FnMut() -> bool) -> Tol
     told
 }
 
+/// All that is hunted of what is planted.
+#[must_use]
+pub fn hunts(seed: u64) -> Vec<Told> {
+    let told = vec![find_plants(seed, 20_000)];
+    #[cfg(feature = "plants")]
+    let told = [told, vec![find_plants_by_orders(seed, 150)]].concat();
+    told
+}
+
+/// By which targets wrong lines of drive-bus and of drive-fleet are hunted.
+#[cfg(feature = "plants")]
+const OF_THE_LINE: &[Target] = &[Target::Schedule, Target::FarEnd];
+#[cfg(feature = "plants")]
+const OF_THE_FLEET: &[Target] = &[Target::Supervisor];
+
 /// Fuzzes each planted defect until it is found, at most so often; those of the line with the feature `plants`.
 pub fn find_plants(seed: u64, at_most: u64) -> Told {
     let begun = Instant::now();
@@ -133,7 +174,8 @@ pub fn find_plants(seed: u64, at_most: u64) -> Told {
         let mut found_by = None;
         for (number, target) in tries {
             told.count += 1;
-            if let Err(why) = target.execute_with(seed.wrapping_add(number), defect) {
+            if let Err(why) = target.execute_with(Source::seeded(seed.wrapping_add(number)), defect) {
+                let why: String = why.chars().take(200).collect();
                 found_by = Some(format!("{target:?} at execution {number}: {why}"));
                 break;
             }
@@ -154,6 +196,36 @@ pub fn find_plants(seed: u64, at_most: u64) -> Told {
     ] {
         let _chosen = drive_bus::mutants::choose(mutant);
         attack(format!("line: {mutant}"), &machines, None);
+    }
+    told.took = begun.elapsed();
+    told
+}
+
+/// The same of every wrong line of drive-bus and drive-fleet, by orders of events.
+#[cfg(feature = "plants")]
+pub fn find_plants_by_orders(seed: u64, at_most: u64) -> Told {
+    let begun = Instant::now();
+    let mut told = Told::new("fuzzing by orders of events, against planted defects", "executions");
+    let fleet = crate::mutation::names_of("drive-fleet").map(|name| (name, OF_THE_FLEET));
+    let lines = drive_bus::mutants::ALL.iter().map(|mutant| (mutant.name, OF_THE_LINE));
+    for (name, targets) in lines.chain(fleet) {
+        let _chosen = drive_bus::mutants::choose(name);
+        let tries = (0..at_most).flat_map(|number| targets.iter().map(move |target| (number, *target)));
+        let mut found_by = None;
+        for (number, target) in tries {
+            told.count += 1;
+            if let Err(why) = target.execute(seed.wrapping_add(number)) {
+                if why.starts_with("open: ") {
+                    continue;
+                }
+                let why: String = why.chars().take(200).collect();
+                found_by = Some(format!("{target:?} at execution {number}: {why}"));
+                break;
+            }
+        }
+        let reached =
+            if drive_bus::mutants::was_reached(name) { "" } else { " (its line was never reached)" };
+        told.plants.push(Plant { name: format!("{name}{reached}"), found_by });
     }
     told.took = begun.elapsed();
     told

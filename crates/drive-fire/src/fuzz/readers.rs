@@ -10,12 +10,14 @@ use drive_bus::{
 use drive_core::{Setpoint, SlaveAddress, serial::SerialSettings};
 use drive_profile::shipped;
 use drive_sim::{SimLine, models::atv312::Atv312};
-use fastrand::Rng;
 
-use super::bytes::{ascii_frame, change, pieces, rtu_frame, telway_frame};
+use super::{
+    bytes::{ascii_frame, change, pieces, rtu_frame, telway_frame},
+    source::Source,
+};
 
 /// Whoever only listens hears no more than was said, and keeps nothing for ever.
-pub(super) fn ear(rng: &mut Rng) -> Result<(), String> {
+pub(super) fn ear(rng: &mut Source) -> Result<(), String> {
     let protocols = ["rtu", "ascii", "unitelway"];
     let which = rng.usize(..protocols.len());
     let protocol: Protocol = protocols[which].parse().map_err(|_| "it is a protocol")?;
@@ -49,7 +51,7 @@ pub(super) fn ear(rng: &mut Rng) -> Result<(), String> {
 }
 
 /// A file that is read piece by piece gives what it gives as a whole.
-pub(super) fn capture(rng: &mut Rng) -> Result<(), String> {
+pub(super) fn capture(rng: &mut Source) -> Result<(), String> {
     let mut file = Vec::new();
     let mut writer = capture::Writer::new(&mut file, Dissector::Rtu).map_err(|error| error.to_string())?;
     for (at, piece) in (0..).zip(pieces(rng, rtu_frame)) {
@@ -89,7 +91,7 @@ pub(super) fn capture(rng: &mut Rng) -> Result<(), String> {
 }
 
 /// A shipped profile that was changed is one, or is refused.
-pub(super) fn profile(rng: &mut Rng) -> Result<(), String> {
+pub(super) fn profile(rng: &mut Source) -> Result<(), String> {
     let (_, text) = shipped::TEXTS[rng.usize(..shipped::TEXTS.len())];
     let mut text = text.as_bytes().to_vec();
     change(rng, &mut text);
@@ -103,7 +105,7 @@ pub(super) fn profile(rng: &mut Rng) -> Result<(), String> {
 }
 
 /// A line of text to the simulator is done or refused.
-pub(super) fn control(rng: &mut Rng) -> Result<(), String> {
+pub(super) fn control(rng: &mut Source) -> Result<(), String> {
     const LINES: &[&str] = &[
         "atv312@1 terminal LI1 on",
         "atv312@1 analog AI1 50%",
@@ -131,7 +133,7 @@ pub(super) fn control(rng: &mut Rng) -> Result<(), String> {
 }
 
 /// What is read is written so that it is read again.
-pub(super) fn words(rng: &mut Rng) -> Result<(), String> {
+pub(super) fn words(rng: &mut Source) -> Result<(), String> {
     const WORDS: &[&str] = &[
         "/dev/ttyUSB0,19200,8E1",
         "tcp:gateway:502",

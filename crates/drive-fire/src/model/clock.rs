@@ -7,6 +7,9 @@ use tokio::time::Instant;
 
 use super::Held;
 
+/// A port is open again so soon.
+const REOPENED: Duration = Duration::from_millis(10);
+
 /// A world around a master, whose time goes from one thing that happens to the next.
 pub(super) trait Clocked {
     fn master(&mut self) -> &mut Master<u32>;
@@ -18,6 +21,9 @@ pub(super) trait Clocked {
 
     /// The master has sent this.
     fn transmitted(&mut self, frame: &[u8]) -> Held;
+
+    /// What was heard of before belongs to a port that was left.
+    fn port_is_left(&mut self) {}
 
     /// When something happens beside the master, by itself.
     fn next(&self) -> Option<Instant> {
@@ -43,6 +49,15 @@ pub(super) trait Clocked {
         let now = *self.now();
         self.master().handle_timeout(now);
         self.collect()?;
+        // A port that brings nothing is left, and opened again.
+        if let Some(why) = self.master().poll_mute(now) {
+            self.port_is_left();
+            self.master().handle_lost(now, &why);
+            self.collect()?;
+            *self.now() = now + REOPENED;
+            self.master().handle_up(now + REOPENED);
+            return Ok(true);
+        }
         if let Some(frame) = self.master().poll_transmit(now) {
             self.transmitted(&frame)?;
             self.master().handle_sent(now);

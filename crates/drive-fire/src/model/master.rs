@@ -139,6 +139,8 @@ struct Call {
     answered: bool,
     outcome: Option<Outcome>,
     dropped: bool,
+    /// Another one that asks the same was open with it: which of them was sent nobody can tell.
+    has_twin: bool,
 }
 
 /// A transmission that waits for its answer.
@@ -195,6 +197,7 @@ impl World {
     }
 
     fn take(&mut self, step: Step) -> Held {
+        super::trace(self.now, format_args!("{step:?}"));
         match step {
             S::Stop => {
                 self.stop_waits.get_or_insert(self.now);
@@ -267,7 +270,12 @@ impl World {
     fn ask(&mut self, slave: u8, request: Request<'static>, terms: Terms) -> Held {
         let id = self.calls.len() as u32;
         let pdu = drive_bus::pdu::encode(&request).map_err(|_| "it is encoded")?.to_vec();
+        let is_twin = |call: &Call| call.outcome.is_none() && call.slave == slave && call.pdu == pdu;
         if let Ok(ticket) = self.master.submit(self.now, slave, request, terms, id) {
+            let mut has_twin = false;
+            for twin in self.calls.values_mut().filter(|call| is_twin(call)) {
+                (twin.has_twin, has_twin) = (true, true);
+            }
             let call = Call {
                 slave,
                 pdu,
@@ -278,6 +286,7 @@ impl World {
                 answered: false,
                 outcome: None,
                 dropped: false,
+                has_twin,
             };
             self.calls.insert(id, call);
         } else if terms.class == Class::Stop {
@@ -331,6 +340,7 @@ impl World {
     /// Bytes whose last is on the wire at `at`.
     fn hears(&mut self, at: Instant, bytes: &[u8]) -> Held {
         self.now = self.now.max(at);
+        super::trace(self.now, format_args!("<- {bytes:02X?}"));
         self.quiet_from = self.now;
         self.master.handle_bytes(self.now, bytes);
         self.collect()?;
@@ -364,7 +374,7 @@ impl World {
             .calls
             .iter_mut()
             .filter(|(_, call)| call.outcome.is_none() && is_it(call))
-            .min_by_key(|(_, call)| call.sent.len());
+            .min_by_key(|(_, call)| (call.dropped, call.sent.len()));
         let Some((&id, call)) = found else {
             let told = self.calls.values().any(|call| is_it(call) && call.outcome.is_some());
             // A probe reads by itself, and a stop that nobody waits for goes on.
@@ -430,8 +440,15 @@ impl Clocked for World {
         &mut self.now
     }
 
+    /// Nothing that was under way there comes any more.
+    fn port_is_left(&mut self) {
+        super::trace(self.now, format_args!("the port is left"));
+        self.lost.extend(self.under_way.take());
+    }
+
     fn transmitted(&mut self, frame: &[u8]) -> Held {
         let (slave, pdu) = (frame[0], frame[1..frame.len() - 2].to_vec());
+        super::trace(self.now, format_args!("-> {slave}: {pdu:02X?}"));
         if self.now < self.quiet_from + SERIAL.t3_5() {
             return Err("3.5 characters of silence stand before each request");
         }
@@ -478,7 +495,8 @@ impl Clocked for World {
             }
             let writes = call.pdu[0] == 6;
             let asked = call.sent.last().copied();
-            if outcome.is_ok() && asked.is_some_and(|asked| self.master.asked_at() > asked) {
+            if outcome.is_ok() && !call.has_twin && asked.is_some_and(|asked| self.master.asked_at() > asked)
+            {
                 return Err("a value is no younger than its question");
             }
             match &outcome {
@@ -487,18 +505,20 @@ impl Clocked for World {
                     if usize::from(number) + 1 != usize::from(self.number) {
                         return Err("a value is the answer to its own question");
                     }
-                    if !call.answered {
+                    if !call.answered && !call.has_twin {
                         return Err("what was not answered is not told as answered");
                     }
                 }
-                Ok(Ok(_)) if !call.answered => return Err("what was not answered is not told as confirmed"),
-                Ok(Err(_)) if writes && call.sent.len() > 1 => {
+                Ok(Ok(_)) if !call.answered && !call.has_twin => {
+                    return Err("what was not answered is not told as confirmed");
+                }
+                Ok(Err(_)) if writes && call.sent.len() > 1 && !call.has_twin => {
                     return Err("a write that was refused when it was repeated has an unknown outcome");
                 }
                 Err(error) if writes && error.nothing_sent() && !call.sent.is_empty() => {
                     return Err("what was told as never sent was not on the wire");
                 }
-                Err(PortError::OutcomeUnknown(_)) if call.sent.is_empty() => {
+                Err(PortError::OutcomeUnknown(_)) if call.sent.is_empty() && !call.has_twin => {
                     return Err("what was never sent has no unknown outcome");
                 }
                 _ => {}

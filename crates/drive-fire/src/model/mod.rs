@@ -7,7 +7,7 @@ pub mod identities;
 pub mod lease;
 pub mod master;
 
-use std::{collections::BTreeMap, fmt, time::Instant};
+use std::{collections::BTreeMap, env, fmt, sync::OnceLock, time::Instant};
 
 use crate::report::{Find, Plant, Told};
 
@@ -167,6 +167,15 @@ pub fn find_plants(model: Model, depth: usize) -> Told {
     }
     told.took = begun.elapsed();
     told
+}
+
+/// Tells what happens to whoever looks for why: with `DRIVE_FIRE_TRACE` set, and one sequence alone.
+fn trace(now: tokio::time::Instant, what: fmt::Arguments<'_>) {
+    static BEGUN: OnceLock<Option<tokio::time::Instant>> = OnceLock::new();
+    let begun = BEGUN.get_or_init(|| env::var_os("DRIVE_FIRE_TRACE").map(|_| now));
+    if let Some(begun) = begun {
+        eprintln!("{:>9.4} s {what}", now.saturating_duration_since(*begun).as_secs_f64());
+    }
 }
 
 /// The names of steps.

@@ -3,10 +3,12 @@
 use std::{fs, io, time::Duration};
 
 use drive_bus::capture::{Captured, Direction, Dissector, Writer};
-use fastrand::Rng;
 
-use super::{Target, judge, plant::Plant};
-use crate::{child, fuzz::change};
+use super::{Target, judge, misfortunes, plant::Plant};
+use crate::{
+    child,
+    fuzz::{Source, change},
+};
 
 /// No tool needs so long for a small file.
 const LONGEST: Duration = Duration::from_secs(20);
@@ -16,6 +18,8 @@ pub(super) struct Files {
     config: Vec<u8>,
     backup: Vec<u8>,
     history: Vec<u8>,
+    /// What SQLite has not written into it yet.
+    log: Vec<u8>,
 }
 
 impl Files {
@@ -32,12 +36,20 @@ impl Files {
             Duration::from_secs(120),
         )?;
         let backup = fs::read(&kept).map_err(|error| io::Error::other(format!("{error}: {ended:?}")))?;
-        let history = history(plant)?;
-        Ok(Self { captures: [own_capture()?, pcap()], config: fs::read(plant.config())?, backup, history })
+        let found = misfortunes::find(&plant.folder.join("state"));
+        let found = found.ok_or_else(|| io::Error::other("the daemon keeps no history"))?;
+        let (history, log) = (fs::read(&found)?, fs::read(misfortunes::log_of(&found)).unwrap_or_default());
+        Ok(Self {
+            captures: [own_capture()?, pcap()],
+            config: fs::read(plant.config())?,
+            backup,
+            history,
+            log,
+        })
     }
 
     /// One of them, changed, is read or refused.
-    pub(super) fn execute(&self, target: Target, plant: &Plant, rng: &mut Rng) -> Result<(), String> {
+    pub(super) fn execute(&self, target: Target, plant: &Plant, rng: &mut Source) -> Result<(), String> {
         let (mut bytes, name, arguments): (_, _, &[&str]) = match target {
             Target::Captures => {
                 let which = rng.usize(..2);
@@ -48,15 +60,21 @@ impl Files {
             _ => (
                 self.history.clone(),
                 "changed.sqlite",
-                &["history", "pump 1", "--from", "2020-01-01", "--file"],
+                &["history", "pump 1", "--from", "2020-01-01 00:00", "--file"],
             ),
         };
         match target {
             // A change in the middle of pages counts more than one byte more, behind which all is moved.
-            Target::History => (0..rng.usize(1..40)).for_each(|_| {
-                let at = rng.usize(..bytes.len());
-                bytes[at] = rng.u8(..);
-            }),
+            Target::History => {
+                let mut log = self.log.clone();
+                let changed = if rng.bool() && !log.is_empty() { &mut log } else { &mut bytes };
+                for _ in 0..rng.usize(1..40) {
+                    let at = rng.usize(..changed.len());
+                    changed[at] = rng.u8(..);
+                }
+                let path = misfortunes::log_of(&plant.folder.join(name));
+                fs::write(path, log).map_err(|error| error.to_string())?;
+            }
             _ => change(rng, &mut bytes),
         }
         let path = plant.folder.join(name);
@@ -70,22 +88,6 @@ impl Files {
         let ended = child::run(&mut command, LONGEST).map_err(|error| error.to_string())?;
         judge::tool(&ended)
     }
-}
-
-/// A copy of the black box as it stands, whole.
-fn history(plant: &Plant) -> io::Result<Vec<u8>> {
-    let mut folders = vec![plant.folder.join("state")];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder)? {
-            let path = entry?.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "sqlite") {
-                return fs::read(path);
-            }
-        }
-    }
-    Err(io::Error::other("the daemon keeps no history"))
 }
 
 fn own_capture() -> io::Result<Vec<u8>> {

@@ -3,9 +3,12 @@
 //! than it kept before, and what is asked rightly behind all that is answered rightly.
 
 mod beside;
+mod broker;
 mod doors;
 mod files;
 mod judge;
+mod misfortunes;
+mod mqtt;
 mod plant;
 
 use std::{
@@ -15,11 +18,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use fastrand::Rng;
-
 pub use judge::find_plants;
 
-use crate::report::{Find, Told};
+use crate::{
+    fuzz::Source,
+    report::{Find, Told},
+};
 use plant::Plant;
 
 /// What is attacked.
@@ -29,6 +33,8 @@ pub enum Target {
     Http,
     /// Frames of Modbus TCP, at the gateway.
     Gateway,
+    /// Messages of a broker.
+    Mqtt,
     /// `explain`, of captures as pcap and pcapng.
     Captures,
     /// `check`, of a configuration.
@@ -37,12 +43,22 @@ pub enum Target {
     Backup,
     /// `history`, of the file of the black box.
     History,
+    /// What befalls the process: killed, without descriptors, with a full disk.
+    Misfortunes,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Http, Self::Gateway, Self::Captures, Self::Configuration, Self::Backup, Self::History];
+    pub const ALL: [Self; 8] = [
+        Self::Http,
+        Self::Gateway,
+        Self::Mqtt,
+        Self::Captures,
+        Self::Configuration,
+        Self::Backup,
+        Self::History,
+        Self::Misfortunes,
+    ];
 }
 
 /// Its gateway beside this mbusd: the same questions to both, for so long.
@@ -69,24 +85,32 @@ pub fn run(
 ) -> io::Result<Told> {
     let begun = Instant::now();
     let mut told = Told::new("the program from outside", "executions");
-    let plant = Plant::start(program)?;
+    let mut plant = Plant::start(program)?;
     let files = files::Files::of(&plant)?;
     let before = plant.memory();
     for target in Target::ALL.into_iter().filter(|target| only.is_none_or(|(one, _)| one == *target)) {
         let (began, mut count, mut whys) = (Instant::now(), 0, BTreeMap::new());
-        while began.elapsed() < of_each && go_on() && (only.is_none() || count == 0) {
+        // Of the misfortunes each comes once at the least.
+        let least = if target == Target::Misfortunes { misfortunes::COUNT } else { 0 };
+        while (began.elapsed() < of_each || count < least) && go_on() && (only.is_none() || count == 0) {
             let number =
                 only.map_or(seed.wrapping_mul(1_000_000_007).wrapping_add(count), |(_, number)| number);
             count += 1;
-            let mut rng = Rng::with_seed(number);
+            let mut rng = Source::seeded(number);
             let held = match target {
                 Target::Http => doors::http(&plant, &mut rng),
                 Target::Gateway => doors::gateway(&plant, &mut rng),
+                Target::Misfortunes => misfortunes::execute(number, &mut plant, &mut rng),
+                Target::Mqtt => mqtt::execute(&plant, &mut rng),
                 _ => files.execute(target, &plant, &mut rng),
             };
             // What lives as before is not asked after each.
             let held = held.and_then(|()| if count % 64 == 1 { doors::lives(&plant) } else { Ok(()) });
             if let Err(why) = held {
+                if let Some((_, what)) = why.split_once("skipped: ") {
+                    told.count_as(format!("not tried: {what}"), 1);
+                    continue;
+                }
                 let kind: String = why.chars().take(40).collect();
                 whys.entry(kind).or_insert((number, why));
             }

@@ -10,6 +10,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use super::{broker::Broker, misfortunes};
+
 /// Until it is there, at the most.
 const READY: Duration = Duration::from_secs(60);
 
@@ -18,8 +20,19 @@ pub(super) struct Plant {
     pub(super) folder: PathBuf,
     pub(super) http: u16,
     pub(super) gateway: u16,
+    pub(super) broker: Broker,
     line: Line,
+    disk: Disk,
     daemon: Option<Child>,
+}
+
+/// Where the daemon keeps its state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Disk {
+    /// Where everything else is.
+    Usual,
+    /// On a small one of its own, where the system gives one.
+    Small,
 }
 
 /// A simulated line.
@@ -56,10 +69,7 @@ impl Line {
 
 impl Drop for Plant {
     fn drop(&mut self) {
-        if let Some(daemon) = &mut self.daemon {
-            let _ = daemon.kill();
-            let _ = daemon.wait();
-        }
+        self.kill();
         let _ = fs::remove_dir_all(&self.folder);
     }
 }
@@ -71,34 +81,97 @@ fn free_port() -> io::Result<u16> {
 impl Plant {
     pub(super) fn start(program: &Path) -> io::Result<Self> {
         let folder = std::env::temp_dir().join(format!("drive-fire-{}", std::process::id()));
+        Self::start_in(program, folder, Disk::Usual)
+    }
+
+    /// Another plant of the same program.
+    pub(super) fn another_with(&self, disk: Disk) -> io::Result<Self> {
+        Self::start_in(&self.program, self.folder.join("another-plant"), disk)
+    }
+
+    fn start_in(program: &Path, folder: PathBuf, disk: Disk) -> io::Result<Self> {
         fs::create_dir_all(&folder)?;
+        let disk = if disk == Disk::Small && !misfortunes::may_mount() { Disk::Usual } else { disk };
         let line = Line::start(program, folder.join("line"))?;
         let (http, gateway) = (free_port()?, free_port()?);
-        let mut plant = Self { program: program.to_owned(), folder, http, gateway, line, daemon: None };
+        let broker = Broker::start()?;
+        let mut plant =
+            Self { program: program.to_owned(), folder, http, gateway, broker, line, disk, daemon: None };
         plant.until("the simulated line", |plant| plant.line.path.exists())?;
         fs::write(plant.config(), plant.text(&plant.line.path))?;
-        let log = File::create(plant.folder.join("log"))?;
-        let daemon = plant
-            .tool()
+        File::create(plant.folder.join("log"))?;
+        plant.begin()?;
+        Ok(plant)
+    }
+
+    /// The daemon begins, and knows its drives when this ends.
+    pub(super) fn begin(&mut self) -> io::Result<()> {
+        let log = File::options().append(true).open(self.folder.join("log"))?;
+        let mut command = self.tool();
+        if self.disk == Disk::Small {
+            fs::create_dir_all(self.state())?;
+            // Its state lies on a disk of its own, which nobody else sees.
+            let script = "mount -t tmpfs -o size=12m none \"$XDG_STATE_HOME\" && exec \"$0\" \"$@\"";
+            command = self.with_state(Command::new("unshare"));
+            command.args(["--map-root-user", "--mount", "sh", "-c", script]).arg(&self.program);
+        }
+        let daemon = command
             .arg("run")
             .arg("--config")
-            .arg(plant.config())
+            .arg(self.config())
             .arg("--socket")
-            .arg(plant.folder.join("socket"))
+            .arg(self.folder.join("socket"))
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(log)
             .spawn()?;
-        plant.daemon = Some(daemon);
-        plant.until("three drives that were identified", |plant| {
+        self.daemon = Some(daemon);
+        self.until("three drives that were identified", |plant| {
             let answer = plant.ask(plant.http, b"GET /api/v1/drives HTTP/1.1\r\nHost: localhost\r\n\r\n");
             let text = answer.map(|answer| String::from_utf8_lossy(&answer).into_owned()).unwrap_or_default();
             text.matches("\"connection\":\"online\"").count()
                 + text.matches("\"connection\": \"online\"").count()
                 >= 3
                 || text.matches("output_frequency").count() >= 3
-        })?;
-        Ok(plant)
+        })
+    }
+
+    /// The daemon is killed as nobody can refuse to be.
+    pub(super) fn kill(&mut self) {
+        if let Some(mut daemon) = self.daemon.take() {
+            let _ = daemon.kill();
+            let _ = daemon.wait();
+        }
+    }
+
+    fn state(&self) -> PathBuf {
+        self.folder.join("state")
+    }
+
+    fn process(&self) -> Option<PathBuf> {
+        Some(PathBuf::from(format!("/proc/{}", self.daemon.as_ref()?.id())))
+    }
+
+    /// The disk of the daemon's state, as it is seen from here; `None`: it has none of its own.
+    pub(super) fn seen_disk(&self) -> Option<PathBuf> {
+        let state = self.state();
+        let below = state.strip_prefix("/").ok()?;
+        Some(self.process()?.join("root").join(below)).filter(|_| self.disk == Disk::Small)
+    }
+
+    /// The highest number of what the daemon has open.
+    pub(super) fn highest_descriptor(&self) -> Option<u64> {
+        let open = fs::read_dir(self.process()?.join("fd")).ok()?;
+        open.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok()).max()
+    }
+
+    /// From now on the daemon may have no descriptor of this number or above. False: nobody can say so here.
+    pub(super) fn limit_descriptors(&self, limit: u64) -> bool {
+        let Some(daemon) = &self.daemon else { return false };
+        let mut command = Command::new("prlimit");
+        command.arg(format!("--pid={}", daemon.id())).arg(format!("--nofile={limit}:"));
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        command.status().is_ok_and(|status| status.success())
     }
 
     /// Another line with the same drives, which this daemon does not serve.
@@ -114,7 +187,7 @@ impl Plant {
 
     /// Whoever comes may stop and give setpoints; nobody can start over the gateway, and nobody is asked to start over HTTP.
     fn text(&self, line: &Path) -> String {
-        let Self { http, gateway, .. } = self;
+        let (Self { http, gateway, .. }, mqtt) = (self, self.broker.port);
         format!(
             "snapshots = \"1s\"\n[http]\nlisten = \"127.0.0.1:{http}\"\n[defaults]\ncontrol = true\n\
              watchdog = {{ time = \"10s\", reaction = \"ramp\" }}\n[lines.bench]\nport = \"{},19200,8E1\"\n\
@@ -122,21 +195,25 @@ impl Plant {
              [[drives]]\nline = \"bench\"\ndrive = \"atv21@5\"\nname = \"fan\"\n\
              [groups]\npumps = [\"pump 1\", \"pump 2\"]\n\
              [[gateways]]\nlisten = \"127.0.0.1:{gateway}\"\nwrites = \"stop\"\nvirtual_unit = 247\nmax_age = \"10s\"\n\
-             [history]\n",
+             [mqtt]\nservers = [\"mqtt://127.0.0.1:{mqtt}\"]\ncommands = true\ndiscovery = \"device\"\n\
+             [mqtt.commanders]\nhmi = \"stop\"\npanel = \"stop\"\ndesk = \"operate\"\n[history]\n",
             line.display()
         )
     }
 
     /// The program, with a state folder of this plant.
     pub(super) fn tool(&self) -> Command {
-        let mut command = Command::new(&self.program);
+        self.with_state(Command::new(&self.program))
+    }
+
+    fn with_state(&self, mut command: Command) -> Command {
         command
             .env_remove("DRIVED_LOG")
             .env("RUST_BACKTRACE", "0")
             .env_remove("RUNTIME_DIRECTORY")
             .env("XDG_RUNTIME_DIR", &self.folder)
             .env_remove("STATE_DIRECTORY")
-            .env("XDG_STATE_HOME", self.folder.join("state"));
+            .env("XDG_STATE_HOME", self.state());
         command
     }
 
