@@ -34,6 +34,8 @@ use crate::{
 
 /// Between two looks at who belongs to the fleet.
 const LOOK: Duration = Duration::from_secs(1);
+/// A look that comes so much later than it should is told: the program, or its computer, stood still.
+const STANDSTILL_MS: i64 = 2_000;
 const MINUTE: Duration = Duration::from_secs(60);
 /// What is longer is kept without what the API told: a command for a thousand drives.
 const LONGEST_BODY: usize = 256 << 10;
@@ -105,8 +107,12 @@ async fn drives(plant: Plant, inbox: Inbox, clocks: Clocks) {
     let mut followed: BTreeMap<Arc<str>, Ending> = BTreeMap::new();
     let mut looks = interval(LOOK);
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut looked = clocks.now();
     loop {
         looks.tick().await;
+        let now = clocks.now();
+        standstill(&inbox, looked, now);
+        looked = now;
         for drive in plant.fleet().drives() {
             if followed.get(drive.name()).is_none_or(|known| known.0.is_finished()) {
                 let name = Arc::clone(drive.name());
@@ -115,6 +121,20 @@ async fn drives(plant: Plant, inbox: Inbox, clocks: Clocks) {
             }
         }
     }
+}
+
+/// Keeps that the program itself did not run between two looks, as when its computer hung: what was not heard then nobody had asked.
+fn standstill(inbox: &Inbox, looked: Moment, now: Moment) {
+    let lasted_ms = now.steady_ms - looked.steady_ms - milliseconds(LOOK);
+    if lasted_ms < STANDSTILL_MS {
+        return;
+    }
+    let text = format!(
+        "this program stood still for {:.1} s: it asked nobody, and heard nobody",
+        lasted_ms as f64 / 1_000.0
+    );
+    let body = Some(format!("{{\"lasted_ms\":{lasted_ms}}}"));
+    inbox.record(Record { body, ..Record::of_history(now, "stood_still", text) });
 }
 
 async fn follow(drive: DriveHandle, inbox: Inbox, clocks: Clocks) {
@@ -173,7 +193,7 @@ fn read(set: Set, snapshot: &Snapshot, numbers: &BTreeSet<u16>) -> Option<Readin
 
 /// Keeps what the event stream tells.
 async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
-    let mut reader = plant.revisions().reader(None);
+    let mut reader = plant.revisions().keeper();
     let mut alarms = Alarms::default();
     loop {
         match plant.revisions().next(&mut reader).await {
@@ -207,6 +227,7 @@ async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
             )),
             Next::End => return,
         }
+        plant.revisions().is_kept(&reader);
     }
 }
 
@@ -325,7 +346,15 @@ fn in_words(command: &CommandView) -> String {
     let CommandView { caller, origin, outcome, .. } = command;
     let several =
         command.several.as_ref().map(|_| format!(" ({})", command.several_in_words())).unwrap_or_default();
-    let of = command.group.as_ref().map(|group| format!(" of group {group}")).unwrap_or_default();
+    // A command for one drive names it beside.
+    let of = match (&command.group, &command.several) {
+        (Some(group), _) => format!(" of group {group}"),
+        (None, Some(several)) if !command.selected.is_empty() => {
+            format!(" of {} drives that were selected", several.drives.len())
+        }
+        (None, Some(several)) => format!(" of all {} drives", several.drives.len()),
+        (None, None) => String::new(),
+    };
     let why = command.text.as_ref().map(|text| format!(": {text}")).unwrap_or_default();
     format!(
         "{}{of} by {caller} from {origin}: {}{several}{why}",
@@ -427,6 +456,39 @@ mod tests {
         };
         assert_eq!(told("unacknowledged"), "no drive answers");
         assert_eq!(told("over"), "over: no drive answers");
+    }
+
+    #[test]
+    fn a_command_for_all_drives_is_told_as_one() {
+        let one = serde_json::json!({
+            "id": "a", "action": "stop", "command": "ramp stop", "caller": "anonymous", "origin": "http 127.0.0.1",
+            "outcome": "confirmed", "open": false, "time_unix_ms": 7, "drive": "pump 1",
+        });
+        let mut all = one.clone();
+        all.as_object_mut().unwrap().remove("drive");
+        for (name, count) in
+            [("confirmed", 1), ("pending", 0), ("not_reachable", 0), ("refused", 0), ("failed", 0)]
+        {
+            all[name] = count.into();
+        }
+        all["drives"] = serde_json::json!([one]);
+        let told = |data: &serde_json::Value| {
+            let frame = format!("id: 1\nevent: command\ndata: {data}\n\n");
+            said(&frame, Moment { steady_ms: 0, wall_ms: 0 }, &mut Alarms::default()).unwrap().text
+        };
+        assert!(told(&all).starts_with("ramp stop of all 1 drives by anonymous"), "{}", told(&all));
+        assert!(told(&one).starts_with("ramp stop by anonymous"), "{}", told(&one));
+    }
+
+    #[test]
+    fn a_program_that_stood_still_keeps_that_it_did_and_a_busy_one_does_not() {
+        for (late_ms, is_told) in [(900, false), (15_000, true)] {
+            let inbox = Inbox::default();
+            let at = |steady_ms| Moment { steady_ms, wall_ms: steady_ms };
+            standstill(&inbox, at(5_000), at(6_000 + late_ms));
+            let kept = inbox.take(Duration::ZERO).records;
+            assert_eq!(kept.iter().any(|record| record.what == "stood_still"), is_told, "{kept:?}");
+        }
     }
 
     #[test]

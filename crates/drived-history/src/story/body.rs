@@ -37,6 +37,9 @@ pub(super) struct Body {
     /// For how long a lost drive had been silent.
     #[serde(default)]
     pub(super) silent_for_ms: Option<u64>,
+    /// For how long the program stood still.
+    #[serde(default)]
+    pub(super) lasted_ms: Option<i64>,
     /// How many records could not be kept.
     #[serde(default)]
     pub(super) records: Option<u64>,

@@ -122,6 +122,18 @@ fn sentence(facts: &Facts, found: &RecordView, with_words: bool) -> Sentence {
         Some(alarm) if found.kind == "alarm" => format!("over: {alarm}"),
         _ => found.text.clone(),
     };
+    // A line on which nothing is heard is opened anew: that its port was away nobody has seen.
+    let text = match text.split_once("nothing was heard for ") {
+        Some((_, detail)) if found.kind == "alarm" && found.line.is_some() => {
+            let over = if text.starts_with("over: ") { "over: " } else { "" };
+            format!("{over}nothing was heard for {detail}")
+        }
+        _ => text,
+    };
+    let text = match facts.trip_behind(found) {
+        Some(_) => format!("{text}; its output was off by the trip, and not by the stop"),
+        None => text,
+    };
     Sentence::of(Certainty::Seen, format!("{who}{asked}{text}{by}{words}")).at(found.time_unix_ms)
 }
 
@@ -149,6 +161,13 @@ pub(super) fn not_known(facts: &Facts, moment: i64, is_about: bool) -> Vec<Sente
     }
     if facts.is_cut {
         let text = "so much happened in the plant that the later part of it was not looked at";
+        said.push(Sentence::of(Certainty::NotKnown, text));
+    }
+    if let Some(after) = facts.ends_soon_after(moment) {
+        let text = format!(
+            "what is kept ends {} behind it: what is read or counted more rarely, such as inputs, what the drive tripped by, and frames of others on its line, may not be there yet",
+            lasting(after)
+        );
         said.push(Sentence::of(Certainty::NotKnown, text));
     }
     let share = facts.known * 100.0;

@@ -9,6 +9,28 @@ use crate::{quantity::Quantity, read::pieces, store::StoreError};
 /// Within this time behind a moment a value moves that belongs to it.
 const MOVES_MS: i64 = 15_000;
 
+/// An event so shortly behind a moment belongs to it.
+const BELONGS_MS: i64 = 1_000;
+/// A value is known for so long behind its reading.
+const HELD_MS: i64 = 3_000;
+
+/// When the drive was last seen without a fault, within a minute before a moment; where it had one all the time, when it was seen last.
+fn last_but_fault(connection: &Connection, facts: &Facts, at: i64) -> Result<Option<i64>, StoreError> {
+    let pieces = pieces(connection, &facts.drive, Quantity::STATE, at - 60_000, at)?;
+    let (mut seen, mut seen_well) = (None, None);
+    for piece in &pieces {
+        for (place, point) in piece.points.iter().enumerate() {
+            let Some(count) = point.count else { continue };
+            let until = piece.points.get(place + 1).map_or(piece.end, |next| next.at - 1).min(at);
+            seen = Some(until);
+            if Quantity::STATE.text(count) != "fault" {
+                seen_well = Some(until);
+            }
+        }
+    }
+    Ok(seen_well.or(seen))
+}
+
 /// How the drive was a moment before something happened.
 pub(super) fn before(
     connection: &Connection,
@@ -28,22 +50,28 @@ pub(super) fn before(
     // The status that shows what happened was read at that moment; the one before it is asked for, or the last one before it was not seen.
     let gap = facts.gap_before(moment).map(|(start, _)| start);
     let at = gap.unwrap_or(moment - 1_000);
+    let (at, gap) = match last_but_fault(connection, facts, at)? {
+        Some(seen) if at - seen > HELD_MS => (seen, Some(seen)),
+        Some(seen) => (seen.min(at), gap),
+        None => (at, gap),
+    };
     let mut known = Vec::new();
     for (quantity, label, unit) in shown {
         let pieces = pieces(connection, &facts.drive, quantity, moment - 60_000, at)?;
         let points: Vec<_> = pieces.iter().flat_map(|piece| &piece.points).collect();
         let Some(last) = points.last() else { continue };
-        let held = pieces.last().filter(|piece| at - piece.end <= 3_000).and(last.count);
+        let held = pieces.last().filter(|piece| at - piece.end <= HELD_MS).and(last.count);
         let Some(count) = held else { continue };
         let text = format!("{label}{}{unit}", quantity.text(count));
-        let most = points
-            .iter()
-            .filter_map(|point| point.count)
-            .max()
-            .filter(|most| quantity.is_number() && *most > count + quantity.deadband());
-        known.push(match most {
-            Some(most) => format!("{text} ({} at the most in the minute before)", quantity.text(most)),
-            None => text,
+        let counts = || points.iter().filter_map(|point| point.count).filter(|_| quantity.is_number());
+        let least = counts().min().filter(|least| *least < count - quantity.deadband());
+        let most = counts().max().filter(|most| *most > count + quantity.deadband());
+        let from = least.map(|least| format!("{} at the least", quantity.text(least)));
+        let to = most.map(|most| format!("{} at the most", quantity.text(most)));
+        let range: Vec<String> = from.into_iter().chain(to).collect();
+        known.push(match range.is_empty() {
+            false => format!("{text} ({} in the minute before)", range.join(", ")),
+            true => text,
         });
     }
     match known.is_empty() {
@@ -78,8 +106,13 @@ pub(super) fn moved(connection: &Connection, facts: &Facts, at: i64) -> Result<V
         (Quantity::DC_BUS_VOLTAGE, "DC bus", "V"),
     ];
     let (mut said, mut load, mut is_steady) = (Vec::new(), None, false);
+    // What moves behind the next event moves by that.
+    let next = facts.records.iter().find(|found| {
+        found.kind != "history" && facts.is_of_drive(found) && found.time_unix_ms > at + BELONGS_MS
+    });
+    let until = next.map_or(at + MOVES_MS, |next| next.time_unix_ms.min(at + MOVES_MS) - 1);
     for (quantity, label, unit) in shown {
-        let pieces = pieces(connection, &facts.drive, quantity, at - MOVES_MS, at + MOVES_MS)?;
+        let pieces = pieces(connection, &facts.drive, quantity, at - MOVES_MS, until)?;
         let points = || pieces.iter().flat_map(|piece| &piece.points);
         let count_then = points().take_while(|point| point.at <= at).last().and_then(|point| point.count);
         let Some(then) = count_then else { continue };

@@ -5,7 +5,10 @@
 
 use std::{
     collections::VecDeque,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 
 use bytes::Bytes;
@@ -50,6 +53,8 @@ impl Subject {
 pub struct Revisions {
     ring: Mutex<Ring>,
     last: watch::Sender<u64>,
+    /// How far is kept.
+    kept: AtomicU64,
 }
 
 struct Ring {
@@ -76,7 +81,7 @@ impl Revisions {
     pub(crate) fn new() -> Self {
         let last = unix(Instant::now());
         let ring = Ring { last, frames: VecDeque::new(), bytes: 0 };
-        Self { ring: Mutex::new(ring), last: watch::Sender::new(last) }
+        Self { ring: Mutex::new(ring), last: watch::Sender::new(last), kept: AtomicU64::new(last) }
     }
 
     /// The number of the newest.
@@ -122,6 +127,20 @@ impl Revisions {
         let last = self.last.subscribe();
         let since = since.unwrap_or(*last.borrow());
         Reader { since, last }
+    }
+
+    /// The reader that keeps everything: from where it has kept, or from the oldest that is still there. What happened before it
+    /// began to read is told to it too, and nothing twice, also where it is opened anew.
+    pub fn keeper(&self) -> Reader {
+        let ring = self.ring();
+        let oldest = ring.last - ring.frames.len() as u64;
+        let since = self.kept.load(Ordering::Relaxed).max(oldest);
+        Reader { since, last: self.last.subscribe() }
+    }
+
+    /// Everything up to where this reader has come is kept.
+    pub fn is_kept(&self, keeper: &Reader) {
+        self.kept.store(keeper.since, Ordering::Relaxed);
     }
 
     /// What is new for a reader, when there is something.
@@ -226,6 +245,26 @@ mod tests {
         let ring = revisions.ring();
         assert_eq!(ring.frames.len(), KEPT);
         assert_eq!(ring.bytes, ring.frames.iter().map(Bytes::len).sum::<usize>());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn whoever_keeps_everything_gets_what_came_before_it_once_also_when_it_is_opened_anew() {
+        let revisions = Revisions::new();
+        revisions.push(Subject::Event, &1);
+        let mut keeper = revisions.keeper();
+        revisions.push(Subject::Event, &2);
+        let Next::Frames(frames) = revisions.next(&mut keeper).await else { panic!("frames") };
+        assert_eq!(frames.len(), 2);
+        revisions.is_kept(&keeper);
+        revisions.push(Subject::Event, &3);
+        let Next::Frames(frames) = revisions.next(&mut revisions.keeper()).await else { panic!("frames") };
+        assert_eq!(frames.len(), 1);
+        for number in 0..=KEPT {
+            revisions.push(Subject::Event, &number);
+        }
+        let Next::Frames(_) = revisions.next(&mut revisions.keeper()).await else {
+            panic!("what is gone is gone, and the rest is told")
+        };
     }
 
     #[tokio::test(start_paused = true)]

@@ -192,3 +192,20 @@ async fn what_became_of_the_last_command_is_kept_whoever_gave_it_and_also_that_i
         (&"stop".into(), &"confirmed".into(), &"anna".into())
     );
 }
+
+#[tokio::test(start_paused = true)]
+async fn that_maintenance_was_done_is_said_of_maintenance_alone_and_to_a_history_that_counts_it() {
+    let bench = Bench::of(1).await;
+    bench.plant.plant.tell_maintenance("north", "pump 1", &[("bearings".to_owned(), "20 000 h".to_owned())]);
+    sleep(Duration::from_secs(5)).await;
+    let due = bench.alarms_of("drive/pump_1/");
+    assert_eq!(due["alarms"][0]["kind"], "maintenance", "{due}");
+    let done = |alarms: &Value| json!({ "action": "done", "alarms": alarms, "note": "greased" });
+    let answer = bench.about_alarms("", &done(&due["waiting"])).await;
+    assert_eq!(answer["alarms"][0]["reason"], "not_kept", "no history is kept here: {answer}");
+    let told = bench.trip().await;
+    let waiting = told["waiting"].as_array().unwrap();
+    let trip: Vec<&Value> = waiting.iter().filter(|one| one["id"] != due["alarms"][0]["id"]).collect();
+    let answer = bench.about_alarms("", &done(&json!(trip))).await;
+    assert!(answer["alarms"][0]["text"].as_str().unwrap().contains("only maintenance"), "{answer}");
+}

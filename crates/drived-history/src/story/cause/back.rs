@@ -1,7 +1,7 @@
 //! How a drive was when it was heard again, and what that says of what it had lost.
 
 use drived_plant::plant::past::{
-    Certainty::{Likely, Seen},
+    Certainty::{Likely, Said, Seen},
     RecordView, SentenceView as Sentence,
 };
 
@@ -10,31 +10,40 @@ use super::{
         body::body,
         facts::{Facts, begins, lasting},
     },
-    evidence::lost_before,
+    evidence::{is_of_supply, loss_before, lost_before},
 };
 
 /// Drives that fell silent within this time of each other may have done so together: so much the polls and their repetitions lie apart.
 pub(super) const SILENT_TOGETHER_MS: i64 = 3_000;
 
+/// What is told with a drive that is heard again is told of the same status: each has its own reading of the clock.
+const WITH_IT_MS: i64 = 500;
+/// Who it is is read when it is heard again, within this time.
+const IDENTIFIED_MS: i64 = 10_000;
+
 /// What a drive that fell silent showed when it was heard again.
-pub(super) struct Back<'a> {
+pub(super) struct Back {
     /// That it was heard again, where it was.
     heard: Option<Sentence>,
-    pub(super) shows: Shows<'a>,
+    pub(super) shows: Shows,
 }
 
 /// What that says of its supply.
-pub(super) enum Shows<'a> {
+pub(super) enum Shows {
     /// It was fed all the time, for this.
     Fed(Sentence),
-    /// It was not, as far as that is likely: its run command was gone.
-    CommandGone(&'a RecordView),
+    /// It was not, as far as that is likely, for this.
+    Unfed(Option<Sentence>),
+    /// It was another drive, for this.
+    Another(Sentence),
+    /// Its fault was gone.
+    Reset(Sentence),
     Nothing,
 }
 
-impl<'a> Back<'a> {
+impl Back {
     /// Of a drive that was lost.
-    pub(super) fn behind(facts: &'a Facts, lost: &RecordView) -> Self {
+    pub(super) fn behind(facts: &Facts, lost: &RecordView) -> Self {
         let connected = connected(facts, lost);
         let heard = connected.map(|connected| {
             let shown = connected.text.strip_prefix("connected: ").unwrap_or(&connected.text);
@@ -42,19 +51,19 @@ impl<'a> Back<'a> {
             let text = format!("it was heard again {after} after it was heard last: {shown}");
             Sentence::of(Seen, text).at(connected.time_unix_ms)
         });
-        let shows = match (command_gone(facts, lost), connected.and_then(|back| fed(facts, back))) {
-            (Some(gone), _) => Shows::CommandGone(gone),
-            (None, Some(fed)) => Shows::Fed(fed),
-            (None, None) => Shows::Nothing,
-        };
+        let another = connected.and_then(|back| another(facts, back)).map(Shows::Another);
+        let gone = || command_gone(facts, lost).map(|gone| Shows::Unfed(of_supply(facts, gone)));
+        let shown = || connected.and_then(|back| fed(facts, back));
+        let reset = || connected.and_then(|back| reset(facts, back)).map(Shows::Reset);
+        let shows = another.or_else(gone).or_else(shown).or_else(reset).unwrap_or(Shows::Nothing);
         Self { heard, shows }
     }
 
     /// What is told of it: how it came back, and what speaks for or against its supply.
-    pub(super) fn told(self, facts: &Facts) -> Vec<Sentence> {
+    pub(super) fn told(self) -> Vec<Sentence> {
         let of_supply = match self.shows {
-            Shows::Fed(sentence) => Some(sentence),
-            Shows::CommandGone(gone) => of_supply(facts, gone),
+            Shows::Fed(sentence) | Shows::Another(sentence) | Shows::Reset(sentence) => Some(sentence),
+            Shows::Unfed(sentence) => sentence,
             Shows::Nothing => None,
         };
         self.heard.into_iter().chain(of_supply).collect()
@@ -73,34 +82,60 @@ fn connected<'a>(facts: &'a Facts, lost: &RecordView) -> Option<&'a RecordView> 
 
 /// Its run command, which had gone when it was seen again behind this loss.
 fn command_gone<'a>(facts: &'a Facts, lost: &RecordView) -> Option<&'a RecordView> {
-    facts.records.iter().find(|found| {
-        facts.is_of_drive(found)
-            && found.number > lost.number
-            && matches!(&*found.what, "command_overridden" | "run_not_adopted")
-            && facts
-                .gap_before(found.time_unix_ms)
-                .is_some_and(|(start, _)| (start - begins(lost)).abs() <= SILENT_TOGETHER_MS)
+    let is_gone = |found: &&RecordView| matches!(&*found.what, "command_overridden" | "run_not_adopted");
+    let gone = facts.records.iter().filter(|found| found.number > lost.number && found.drive == lost.drive);
+    gone.filter(is_gone).find(|found| {
+        loss_before(facts, found.time_unix_ms).is_some_and(|(before, _)| before.number == lost.number)
     })
 }
 
-/// What shows that a drive was fed while it was silent.
-fn fed(facts: &Facts, connected: &RecordView) -> Option<Sentence> {
+/// What is told of a drive within this time of its being heard again.
+fn behind<'a>(
+    facts: &'a Facts,
+    connected: &RecordView,
+    what: &[&str],
+    within: i64,
+) -> Option<&'a RecordView> {
+    let later = facts.records.iter().filter(|found| {
+        found.number > connected.number
+            && found.kind == "event"
+            && found.drive == connected.drive
+            && (0..=within).contains(&(found.time_unix_ms - connected.time_unix_ms))
+    });
+    later.take_while(|found| found.what != "lost").find(|found| what.contains(&&*found.what))
+}
+
+/// That another drive answers in its place.
+fn another(facts: &Facts, connected: &RecordView) -> Option<Sentence> {
+    let found = behind(facts, connected, &["other_family", "identity_changed"], IDENTIFIED_MS)?;
+    let text = format!("another drive answers in its place: {}", found.text);
+    Some(Sentence::of(Said, text).at(found.time_unix_ms))
+}
+
+/// That a fault had gone while nothing was heard of it: some drives begin anew with a reset, and answer nobody meanwhile.
+fn reset(facts: &Facts, connected: &RecordView) -> Option<Sentence> {
+    let cleared = behind(facts, connected, &["fault_cleared"], WITH_IT_MS)?;
+    let text = "its fault was gone when it was heard again: it was reset, or switched off and on, and a drive that begins anew answers nobody meanwhile";
+    Some(Sentence::of(Likely, text).at(cleared.time_unix_ms))
+}
+
+/// What shows whether a drive was fed while it was silent.
+fn fed(facts: &Facts, connected: &RecordView) -> Option<Shows> {
     let at = connected.time_unix_ms;
-    let with_it = |what: &str| {
-        let mut own = facts.records.iter().filter(|found| {
-            found.number > connected.number && found.drive == connected.drive && found.time_unix_ms == at
-        });
-        own.find(|found| found.what == what)
-    };
+    let with_it = |what: &str| behind(facts, connected, &[what], WITH_IT_MS);
     if let Some(trip) = with_it("tripped") {
         let faults = [Some(trip), facts.explained(trip)].into_iter().flatten();
         let mut faults = faults.filter_map(|found| body(found).fault);
         let by_watchdog = faults.any(|fault| fault.by_watchdog);
+        let words = facts.in_words(trip);
+        if is_of_supply(&words) {
+            let text = format!("{words}: the drive itself speaks of its supply");
+            return Some(Shows::Unfed(Some(Sentence::of(Likely, text).at(at))));
+        }
         let text = format!(
-            "{}: a watchdog acts in a drive that is fed and not spoken to, so that its supply was not away",
-            facts.in_words(trip)
+            "{words}: a watchdog acts in a drive that is fed and not spoken to, so that its supply was not away",
         );
-        return by_watchdog.then(|| Sentence::of(Likely, text).at(at));
+        return by_watchdog.then(|| Shows::Fed(Sentence::of(Likely, text).at(at)));
     }
     // Its state was the same before: else it is told that it became another.
     let shown = body(connected).status.unwrap_or_default();
@@ -108,7 +143,7 @@ fn fed(facts: &Facts, connected: &RecordView) -> Option<Sentence> {
         && shown.control.as_deref() == Some("bus")
         && with_it("state_changed").is_none();
     let text = "it ran on when it was heard again, and a run command of a bus does not outlast the supply of its drive: that was not away";
-    runs_on.then(|| Sentence::of(Likely, text).at(at))
+    runs_on.then(|| Shows::Fed(Sentence::of(Likely, text).at(at)))
 }
 
 /// That a drive whose run command was gone when it was seen again had lost its supply: what else takes a run command away while a drive is silent

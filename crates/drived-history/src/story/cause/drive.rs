@@ -1,5 +1,7 @@
 //! Who or what did something at a drive: somebody here, the program by its policy, or the drive and whoever else commands it.
 
+use std::collections::BTreeSet;
+
 use drived_plant::plant::past::{
     Certainty::{Likely, NotKnown, Said, Seen},
     RecordView, SentenceView as Sentence,
@@ -8,26 +10,28 @@ use drived_plant::plant::past::{
 use super::{
     super::{
         body::{Cause, body},
-        facts::Facts,
+        facts::{Facts, begins},
     },
-    back::of_supply,
+    back::{SILENT_TOGETHER_MS, of_supply},
     evidence::{
-        BESIDE_MS, SILENT_MS, asked_before, found_within, inputs_stayed, lost_before, nobody_asked,
-        seen_beside,
+        BESIDE_MS, SILENT_MS, asked_before, found_within, inputs_stayed, loss_before, lost_before, names,
+        nobody_asked, seen_beside,
     },
 };
 
-/// No drive is off and on again, and answers, within this time.
-const BOOT_MS: i64 = 1_500;
-
 /// What somebody or something did at the drive itself.
 pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, open: &str) -> Vec<Sentence> {
-    let mut all = vec![said];
-    all.extend(lost_before(facts, about.time_unix_ms));
-    if matches!(&*about.what, "command_overridden" | "run_not_adopted") {
-        all.extend(of_supply(facts, about));
+    let mut all = Vec::new();
+    if matches!(&*about.what, "command_overridden" | "run_not_adopted")
+        && let Some(supply) = of_supply(facts, about)
+    {
+        all.push(supply);
+        all.extend(silent_with(facts, about.time_unix_ms));
     }
+    all.push(said);
+    all.extend(lost_before(facts, about.time_unix_ms));
     all.extend(of_word(facts, about));
+    all.extend(acted_upon(facts, about));
     all.extend(seen_beside(facts, about.time_unix_ms));
     if about.what == "output_blocked" {
         all.extend(of_low_speed(facts, about));
@@ -36,14 +40,50 @@ pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, op
     all
 }
 
-/// That its run command went by another word, where the drive's words leave a power cycle open: it was heard all the time.
+/// That it was heard all the time in which its run command went: a power cycle was shorter than two polls, if it was one.
 fn of_word(facts: &Facts, about: &RecordView) -> Option<Sentence> {
     let at = about.time_unix_ms;
-    let is_open = about.text.contains("power cycle") && facts.is_heard(at - BOOT_MS, at);
+    let is_heard = facts.is_heard(at - BESIDE_MS / 30, at) && loss_before(facts, at).is_none();
+    let is_open = about.text.contains("power cycle") && is_heard;
     is_open.then(|| {
-        let text = "no power cycle, for it was heard all the time: another word was written to it, as another master does";
-        Sentence::of(Likely, text)
+        let text = "it was heard all the time: another word was written to it, as another master does, or its supply was away for less than two polls; which of them is not known";
+        Sentence::of(NotKnown, text)
     })
+}
+
+/// Others of which nothing was heard in the same time: what they share may be what was away.
+fn silent_with(facts: &Facts, at: i64) -> Vec<Sentence> {
+    let Some(start) = loss_before(facts, at).map(|(lost, _)| begins(lost)) else { return Vec::new() };
+    let silent = facts.elsewhere("lost", start, BESIDE_MS);
+    let silent: Vec<&RecordView> =
+        silent.into_iter().filter(|other| (begins(other) - start).abs() <= SILENT_TOGETHER_MS).collect();
+    if silent.is_empty() {
+        return Vec::new();
+    }
+    let lines: BTreeSet<_> = silent.iter().map(|other| &other.line).collect();
+    let place = match lines.iter().any(|line| **line != facts.line) {
+        true => "on other lines too",
+        false => "of its line",
+    };
+    vec![
+        Sentence::of(Seen, format!("{} fell silent with it, {place}", names(&silent))),
+        Sentence::of(Likely, "what feeds them all was away, such as the mains"),
+    ]
+}
+
+/// What the program did upon it by itself: that may be what brought the motor to a standstill.
+fn acted_upon(facts: &Facts, about: &RecordView) -> Option<Sentence> {
+    let own = facts.records.iter().filter(|found| {
+        found.drive == about.drive
+            && found.number > about.number
+            && (0..=BESIDE_MS / 6).contains(&(found.time_unix_ms - about.time_unix_ms))
+    });
+    let mut own = own.filter(
+        |found| matches!(facts.cause_of(found), Some(Cause::Policy { policy }) if policy == about.what),
+    );
+    let ended = own.find(|found| found.what == "state_changed")?;
+    let text = format!("upon this, this program ended the run by itself, by its policy: {}", ended.text);
+    Some(Sentence::of(Seen, text).at(ended.time_unix_ms))
 }
 
 /// What the drive showed before it came to stand, where that had been done at the drive.
@@ -116,6 +156,11 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             let at = about.time_unix_ms;
             let mut said = vec![found_within(facts, at, "it was found so when the drive was seen again")];
             said.extend(lost_before(facts, at));
+            // What was asked for before it was seen again may have done it.
+            if let Some(asked) = asked_before(facts, about, &["start", "stop", "release", "reset"]) {
+                let text = format!("a command of here came shortly before: {}", asked.text);
+                said.insert(0, Sentence::of(Likely, text).at(asked.time_unix_ms));
+            }
             said
         }
         Some(Cause::Drive) | None => {
@@ -152,10 +197,14 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                 _ => {}
             }
             said.extend(seen_beside(facts, at));
+            let by_hand = facts.control_at(at + 1).filter(|control| *control != "bus");
             let who = match &*about.what {
+                _ if by_hand.is_some() => {
+                    "who it was, or which of its inputs and keys, cannot be seen from the line"
+                }
                 _ if shown.is_some() => "who or what did it at the drive cannot be seen from the line",
                 "fault_cleared" => {
-                    "its panel, its terminals, another master or the drive itself cleared it: which of them is not known"
+                    "its panel, its terminals, another master, the drive itself, or its supply that was off and on: which of them cleared it is not known"
                 }
                 _ if begins_to_run => {
                     "another master, its panel, its terminals or the drive itself started it: which of them is not known for certain"
@@ -168,6 +217,23 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             said
         }
     }
+}
+
+/// What was asked for here; of a stop, what it was that ended it.
+pub(super) fn of_command(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
+    let mut said = vec![Sentence::of(Seen, format!("it was asked for here: {}", about.text))];
+    if about.what == "stop" {
+        let within = about.time_unix_ms..=about.time_unix_ms + BESIDE_MS;
+        let mut own = facts.records.iter().filter(|found| {
+            found.kind == "event" && facts.is_of_drive(found) && within.contains(&found.time_unix_ms)
+        });
+        let ended = own.find(|found| found.what == "stop_confirmed");
+        if let Some(trip) = ended.and_then(|ended| facts.trip_behind(ended)) {
+            let text = format!("its output was off by a trip, and not by the stop: {}", facts.in_words(trip));
+            said.push(Sentence::of(Seen, text).at(trip.time_unix_ms));
+        }
+    }
+    said
 }
 
 pub(super) fn of_departure(facts: &Facts, about: &RecordView) -> Vec<Sentence> {

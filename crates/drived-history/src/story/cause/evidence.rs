@@ -2,12 +2,12 @@
 
 use drived_plant::plant::past::{
     Certainty::{Likely, NotKnown, Seen},
-    RecordView, SentenceView as Sentence,
+    LineMinuteView, RecordView, SentenceView as Sentence,
 };
 
 use super::super::{
     body::body,
-    facts::{Facts, lasting},
+    facts::{Facts, SEEN_AGAIN_MS, begins, lasting},
 };
 
 /// What comes within this time of each other may have one cause.
@@ -18,8 +18,18 @@ pub(super) const ONE_POLL_MS: i64 = 5_000;
 pub(super) const OBEYED_MS: i64 = 10_000;
 /// A silence may be the cause of a trip of the watchdog within this time.
 pub(super) const SILENT_MS: i64 = 90_000;
+/// An input that was read otherwise longer before what it did had done something else: the status is read often.
+const INPUT_BEFORE_MS: i64 = 2_000;
 /// The slow set is read so rarely that what it shows belongs to something within this time.
 pub(super) const BESIDE_MS: i64 = 60_000;
+
+/// What a fault is called in a manual that is one of the supply.
+const OF_SUPPLY: [&str; 4] = ["suppl", "mains", "undervoltage", "input phase"];
+
+/// Whether what a drive says of a fault is of its supply.
+pub(super) fn is_of_supply(reason: &str) -> bool {
+    OF_SUPPLY.iter().any(|word| reason.to_lowercase().contains(word))
+}
 
 /// That nobody here asked for something, where that is known: what begins between two looks at a drive was asked for shortly before.
 pub(super) fn nobody_asked(facts: &Facts, at: i64) -> Sentence {
@@ -95,22 +105,37 @@ pub(super) fn found_within(facts: &Facts, at: i64, what: &str) -> Sentence {
 
 /// That it had not answered until it was seen again.
 pub(super) fn lost_before(facts: &Facts, at: i64) -> Option<Sentence> {
-    let (start, end) = facts.gap_before(at)?;
-    let lost = facts.records.iter().rev().find(|found| {
-        found.what == "lost"
-            && found.drive.as_deref() == Some(&*facts.drive)
-            && (start - TOGETHER_MS..=end).contains(&found.time_unix_ms)
-    })?;
-    let text = format!("it had not answered before, for {}: {}", lasting(end - start), lost.text);
+    let (lost, end) = loss_before(facts, at)?;
+    let text =
+        format!("nothing had been heard of it before, for {}: {}", lasting(end - begins(lost)), lost.text);
     Some(Sentence::of(Seen, text).at(lost.time_unix_ms))
+}
+
+/// The loss of the drive that had ended when it was seen again at a moment, and when it ended.
+pub(super) fn loss_before(facts: &Facts, at: i64) -> Option<(&RecordView, i64)> {
+    let own =
+        || facts.records.iter().rev().filter(|found| facts.is_of_drive(found) && found.time_unix_ms <= at);
+    let back = own().find(|found| found.what == "connected" && at - found.time_unix_ms <= SEEN_AGAIN_MS);
+    // That it was heard again may be among what is missing: its values show it too.
+    let (number, end) = match back {
+        Some(back) => (back.number, back.time_unix_ms),
+        None => (i64::MAX, facts.gap_before(at)?.1),
+    };
+    let lost = own().filter(|found| found.number < number);
+    let lost = lost.take_while(|found| found.what != "connected").find(|found| found.what == "lost")?;
+    Some((lost, end))
+}
+
+/// What its line counted in the minute in which a moment lies.
+pub(super) fn minute(facts: &Facts, at: i64) -> Option<&LineMinuteView> {
+    facts.minutes.iter().find(|minute| (at..=at + BESIDE_MS).contains(&minute.time_unix_ms))
 }
 
 /// That its inputs were read otherwise behind something than before it.
 pub(super) fn inputs_changed(facts: &Facts, at: i64) -> Option<Sentence> {
-    let changed = facts
-        .inputs
-        .windows(2)
-        .find(|pair| pair[0].1 != pair[1].1 && (at - BESIDE_MS..=at + BESIDE_MS).contains(&pair[1].0))?;
+    let changed = facts.inputs.windows(2).find(|pair| {
+        pair[0].1 != pair[1].1 && (at - INPUT_BEFORE_MS..=at + BESIDE_MS).contains(&pair[1].0)
+    })?;
     let ((_, before), (seen, now)) = (changed[0], changed[1]);
     let text = format!(
         "its inputs changed from {before:04X}h to {now:04X}h, seen when they were read next ({})",
@@ -139,10 +164,11 @@ pub(super) fn seen_beside(facts: &Facts, at: i64) -> Vec<Sentence> {
         let text = "an input of the drive may have done it: what each does is in the drive's settings";
         said.push(Sentence::of(Likely, text));
     }
-    let heard = facts.foreigners.iter().find(|(ended, _)| (at..=at + BESIDE_MS).contains(ended));
-    if let Some((ended, frames)) = heard {
-        let text = format!("its line heard {frames} frames of somebody else in the minute until then");
-        said.push(Sentence::of(Seen, text).at(*ended));
+    let heard = minute(facts, at).filter(|minute| minute.foreign > 0);
+    if let Some(minute) = heard {
+        let text =
+            format!("its line heard {} frames of somebody else in the minute until then", minute.foreign);
+        said.push(Sentence::of(Seen, text).at(minute.time_unix_ms));
         said.push(Sentence::of(
             Likely,
             "another master speaks on the line: it may have written to the drive",

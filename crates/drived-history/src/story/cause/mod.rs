@@ -12,7 +12,10 @@
 //! | the time at low speed | likely | the drive names it among others, a setpoint came before, and no input changed |
 //! | its supply | likely | it was silent, and its run command was gone when it was seen again |
 //! | its cable, and not its supply | likely | it was silent, and when it was heard again it ran on by a bus, or its watchdog had acted |
-//! | another word, and no power cycle | likely | it was heard all the time in which its run command went |
+//! | what feeds several | likely | its supply was away, and others fell silent with it |
+//! | its fault was reset, or it was switched off and on | likely | it had tripped, fell silent, and its fault was gone when it was heard again |
+//! | what spoils answers on the line | likely | it was lost by answers that were damaged |
+//! | another drive in its place | said | it names another one when it is heard again |
 //! | what a line's drives share | likely | they fell silent together, and nobody of them answered meanwhile |
 //! | what lines share | likely | drives of other lines fell silent with it |
 //! | one cause of several trips | likely | within two seconds, and by the same, or all by the supply |
@@ -33,7 +36,7 @@ use drived_plant::plant::past::{
 };
 
 use self::{
-    drive::{at_the_drive, of_change, of_departure, of_unconfirmed_stop},
+    drive::{at_the_drive, of_change, of_command, of_departure, of_unconfirmed_stop},
     evidence::{SILENT_MS, TOGETHER_MS},
     silence::of_loss,
     trip::of_trip,
@@ -67,9 +70,7 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         ),
         "stop_unconfirmed" => of_unconfirmed_stop(facts, about),
         "output_departed" => of_departure(facts, about),
-        _ if about.kind == "command" => {
-            vec![Sentence::of(Seen, format!("it was asked for here: {}", about.text))]
-        }
+        _ if about.kind == "command" => of_command(facts, about),
         _ => vec![Sentence::of(Seen, about.text.clone())],
     };
     said.extend(program(facts, about.time_unix_ms));
@@ -109,7 +110,10 @@ fn program(facts: &Facts, at: i64) -> Vec<Sentence> {
         .iter()
         .filter(is_near)
         .filter(|found| {
-            matches!(&*found.what, "began" | "began_after_kill" | "ended" | "hole" | "clock_stepped")
+            matches!(
+                &*found.what,
+                "began" | "began_after_kill" | "ended" | "hole" | "clock_stepped" | "stood_still"
+            )
         })
         .map(|found| Sentence::of(Seen, found.text.clone()).at(found.time_unix_ms))
         .collect()

@@ -6,9 +6,12 @@ use drived_plant::plant::past::{
 };
 
 use super::{
-    super::facts::{Facts, begins},
+    super::{
+        body::body,
+        facts::{Facts, begins, lasting},
+    },
     back::{Back, SILENT_TOGETHER_MS, Shows},
-    evidence::{SILENT_MS, TOGETHER_MS, names},
+    evidence::{SILENT_MS, TOGETHER_MS, minute, names},
 };
 
 /// Why a drive heard nothing for so long that its watchdog acted.
@@ -22,7 +25,7 @@ pub(super) fn of_silence(facts: &Facts, at: i64) -> Vec<Sentence> {
     match own {
         Some(lost) => {
             let mut said = vec![
-                Sentence::of(Seen, format!("it had not answered before: {}", lost.text))
+                Sentence::of(Seen, format!("nothing had been heard of it before: {}", lost.text))
                     .at(lost.time_unix_ms),
             ];
             said.extend(of_loss(facts, lost));
@@ -58,8 +61,19 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             Sentence::of(NotKnown, "who unplugged it, or what broke, the program cannot see"),
         ];
     }
-    let neighbours = facts.neighbours();
     let began = begins(about);
+    let still = facts.records.iter().find(|found| {
+        let lasted = body(found).lasted_ms.unwrap_or_default();
+        found.what == "stood_still"
+            && (found.time_unix_ms - lasted - TOGETHER_MS..=at + TOGETHER_MS).contains(&began)
+            && found.time_unix_ms >= began
+    });
+    if let Some(still) = still {
+        return vec![
+            Sentence::of(Seen, still.text.clone()).at(still.time_unix_ms),
+            Sentence::of(NotKnown, "whether it would have answered meanwhile: nobody asked it"),
+        ];
+    }
     let mut lost = facts.elsewhere("lost", at, 2 * TOGETHER_MS);
     lost.retain(|other| (begins(other) - began).abs() <= SILENT_TOGETHER_MS);
     let answered = facts.heard_between(began, began + SILENT_TOGETHER_MS);
@@ -85,71 +99,110 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             ),
         ]
         .into_iter()
-        .chain(back.told(facts))
+        .chain(back.told())
         .collect();
     }
-    if let Some(why) =
-        facts.missing(at - 2 * TOGETHER_MS, at + 2 * TOGETHER_MS).filter(|_| on_line.is_empty())
-    {
+    let why = facts.missing(at - 2 * TOGETHER_MS, at + 2 * TOGETHER_MS).or_else(|| {
+        let after = facts.ends_soon_after(at).filter(|after| *after <= TOGETHER_MS)?;
+        Some(format!("what is kept ends {} behind it", lasting(after)))
+    });
+    if let Some(why) = why.filter(|_| on_line.is_empty()) {
         let text = format!("whether others fell silent with it is not known: {why}");
-        return [Sentence::of(NotKnown, text)].into_iter().chain(back.told(facts)).collect();
+        return [Sentence::of(NotKnown, text)].into_iter().chain(back.told()).collect();
     }
-    match on_line.len() {
-        0 => {
-            let others = match neighbours.is_empty() {
-                // A drive to which nothing happened has no record: that nobody else is there is not known.
-                true => "nothing is recorded of another drive of its line around then".to_owned(),
-                false => format!(
-                    "no other drive of its line is recorded as lost within {} s of it",
-                    SILENT_TOGETHER_MS / 1_000
-                ),
-            };
-            let mut said = vec![Sentence::of(Seen, others)];
-            let open = match back.shows {
-                Shows::Fed(_) => Some(Sentence::of(
-                    Likely,
-                    "its own branch of the cable, or what it is plugged in by: its address and its settings are those of before, for it is heard by them again",
-                )),
-                Shows::CommandGone(_) => None,
-                Shows::Nothing => Some(Sentence::of(
-                    NotKnown,
-                    "its supply, its branch of the cable, its address or its settings: which, the line does not show",
-                )),
-            };
-            said.extend(back.told(facts));
-            said.extend(open);
-            said
-        }
-        _ => {
-            let mut said =
-                vec![Sentence::of(Seen, format!("{} of its line fell silent with it", names(&on_line)))];
-            let shared = match (answered.is_empty(), &back.shows) {
-                (true, Shows::Fed(_)) => {
-                    "what they share is the likely cause: the cable or its adapter; which of them is not known"
-                }
-                (true, Shows::CommandGone(_)) => "what they share is the likely cause: their supply",
-                (true, Shows::Nothing) => {
-                    "what they share is the likely cause: the cable, its adapter, or the supply of these drives; which of them is not known"
-                }
-                (false, Shows::Fed(_)) => {
-                    "what only they share is the likely cause, such as their part of the cable; that they fell silent together may be chance"
-                }
-                (false, Shows::CommandGone(_)) => {
-                    "what only they share is the likely cause, such as their supply; that they fell silent together may be chance"
-                }
-                (false, Shows::Nothing) => {
-                    "what only they share is the likely cause, such as their supply or their part of the cable; that they fell silent together may be chance"
-                }
-            };
-            if !answered.is_empty() {
-                let text = format!("{} of its line answered meanwhile", answered.join(", "));
-                said.push(Sentence::of(Seen, text));
-            }
-            said.push(Sentence::of(Likely, shared));
-            said.extend(back.told(facts));
-            said
-        }
+    match (damaged(facts, about), on_line.is_empty()) {
+        (Some(damaged), _) => damaged.into_iter().chain(back.told()).collect(),
+        (None, true) => alone(facts, back),
+        (None, false) => on_its_line(&on_line, &answered, back),
     }
+}
+
+/// What is told of a drive of which nothing that could be used was heard, because what it answered was damaged.
+fn damaged(facts: &Facts, about: &RecordView) -> Option<Vec<Sentence>> {
+    if about.text.contains("exception ") {
+        let text = "it was heard: it answered, and by its answer did not say how it is";
+        return Some(vec![
+            Sentence::of(Seen, text),
+            Sentence::of(NotKnown, "why it answered so is known to the drive alone"),
+        ]);
+    }
+    let words = ["was damaged", "does not fit the request"];
+    words.iter().any(|words| about.text.contains(words)).then_some(())?;
+    let mut said = vec![Sentence::of(Seen, "it was heard: what came of its answers was damaged")];
+    if let Some(minute) = minute(facts, begins(about)) {
+        let text = format!(
+            "on its line {} of {} answers were damaged in the minute until then, whoever gave them",
+            minute.damaged,
+            minute.damaged + minute.answered
+        );
+        said.push(Sentence::of(Seen, text).at(minute.time_unix_ms));
+    }
+    said.push(Sentence::of(
+        Likely,
+        "what spoils answers on a line: its cable, its ends, its shield, or somebody who speaks at the same time",
+    ));
+    said.push(Sentence::of(
+        NotKnown,
+        "whether it is the whole line or its branch: a drive of which more is asked is lost first",
+    ));
+    Some(said)
+}
+
+/// Of a drive that fell silent alone.
+fn alone(facts: &Facts, back: Back) -> Vec<Sentence> {
+    let others = match facts.neighbours().is_empty() {
+        // A drive to which nothing happened has no record: that nobody else is there is not known.
+        true => "nothing is recorded of another drive of its line around then".to_owned(),
+        false => format!(
+            "no other drive of its line is recorded as lost within {} s of it",
+            SILENT_TOGETHER_MS / 1_000
+        ),
+    };
+    let mut said = vec![Sentence::of(Seen, others)];
+    let open = match back.shows {
+        Shows::Fed(_) => Some(Sentence::of(
+            Likely,
+            "its own branch of the cable, or what it is plugged in by: its address and its settings are those of before, for it is heard by them again",
+        )),
+        Shows::Unfed(_) | Shows::Another(_) | Shows::Reset(_) => None,
+        Shows::Nothing => Some(Sentence::of(
+            NotKnown,
+            "its supply, its branch of the cable, its address or its settings: which, the line does not show",
+        )),
+    };
+    said.extend(back.told());
+    said.extend(open);
+    said
+}
+
+/// Of a drive that fell silent with others of its line, while these answered.
+fn on_its_line(with_it: &[&RecordView], answered: &[&str], back: Back) -> Vec<Sentence> {
+    let mut said = vec![Sentence::of(Seen, format!("{} of its line fell silent with it", names(with_it)))];
+    let shared = match (answered.is_empty(), &back.shows) {
+        (true, Shows::Fed(_)) => {
+            "what they share is the likely cause: the cable or its adapter; which of them is not known"
+        }
+        (true, Shows::Unfed(_)) => "what they share is the likely cause: their supply",
+        (true, _) => {
+            "what they share is the likely cause: the cable, its adapter, or the supply of these drives; which of them is not known"
+        }
+        (false, Shows::Fed(_)) => {
+            "what only they share is the likely cause, such as their part of the cable; that they fell silent together may be chance"
+        }
+        (false, Shows::Unfed(_)) => {
+            "what only they share is the likely cause, such as their supply; that they fell silent together may be chance"
+        }
+        (false, _) => {
+            "what only they share is the likely cause, such as their supply or their part of the cable; that they fell silent together may be chance"
+        }
+    };
+    if !answered.is_empty() {
+        let text = format!("{} of its line answered meanwhile", answered.join(", "));
+        said.push(Sentence::of(Seen, text));
+    }
+    said.push(Sentence::of(Likely, shared));
+    said.extend(back.told());
+    said
 }
 
 /// An alarm as far as it is looked at here.

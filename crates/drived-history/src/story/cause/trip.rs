@@ -11,7 +11,8 @@ use super::{
         facts::{Facts, lasting},
     },
     evidence::{
-        SILENT_MS, TOGETHER_MS, asked_before, found_within, in_order, inputs_changed, lost_before, names,
+        SILENT_MS, TOGETHER_MS, asked_before, found_within, in_order, inputs_changed, is_of_supply,
+        lost_before, names,
     },
     silence::of_silence,
 };
@@ -20,8 +21,6 @@ use super::{
 const ONE_CAUSE_MS: i64 = 2_000;
 /// So many others that trip at once do not do so by chance.
 const MANY: usize = 3;
-/// What a fault is called in a manual that is one of the supply.
-const OF_SUPPLY: [&str; 4] = ["suppl", "mains", "undervoltage", "input phase"];
 
 pub(super) fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     let at = about.time_unix_ms;
@@ -56,6 +55,7 @@ pub(super) fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     if let Some(asked) = asked_before(facts, about, &["start", "setpoint", "stop"]) {
         said.push(in_order(facts, about, asked));
     }
+    said.extend(of_stop(facts, about));
     let departed = facts.records.iter().rev().find(|found| {
         found.what == "output_departed"
             && facts.is_of_drive(found)
@@ -65,6 +65,15 @@ pub(super) fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         said.push(Sentence::of(Seen, format!("before it, its {}", departed.text)).at(departed.time_unix_ms));
     }
     said
+}
+
+/// That a stop which is told as confirmed was ended by the trip.
+fn of_stop(facts: &Facts, trip: &RecordView) -> Option<Sentence> {
+    let own = facts.records.iter().filter(|found| found.number > trip.number && found.drive == trip.drive);
+    let mut own = own.take_while(|found| found.what != "fault_cleared");
+    let stop = own.find(|found| found.what == "stop_confirmed" && facts.trip_behind(found).is_some())?;
+    let text = "a stop is told as confirmed behind it: the output was off by the trip, and not by the stop";
+    Some(Sentence::of(Seen, text).at(stop.time_unix_ms))
 }
 
 /// What a trip was by, of its words: none where that was not read.
@@ -78,6 +87,14 @@ fn beside(facts: &Facts, about: &RecordView, is_found: bool, by_watchdog: bool) 
     let mut tripped = facts.elsewhere("tripped", at, TOGETHER_MS);
     // Of what nobody saw happening nobody knows that it was together.
     let was_found = |found: &&RecordView| body(found).fault.is_some_and(|fault| fault.found);
+    // What was seen to trip before this one was heard last, or behind it, did so apart from it.
+    let window = facts.gap_before(at).filter(|_| is_found);
+    let is_apart = |other: &&RecordView| {
+        window.is_some_and(|(start, end)| {
+            !was_found(other) && !(start - ONE_CAUSE_MS..=end).contains(&other.time_unix_ms)
+        })
+    };
+    tripped.retain(|other| !is_apart(other));
     let found_too: Vec<&RecordView> =
         tripped.extract_if(.., |other| is_found || was_found(&&**other)).collect();
     let mut said = Vec::new();
@@ -91,7 +108,6 @@ fn beside(facts: &Facts, about: &RecordView, is_found: bool, by_watchdog: bool) 
     }
     let own = facts.in_words(about);
     let own = reason(&own);
-    let is_of_supply = |reason: &str| OF_SUPPLY.iter().any(|word| reason.to_lowercase().contains(word));
     let is_at_once = |other: &RecordView| (other.time_unix_ms - at).abs() <= ONE_CAUSE_MS;
     let are_many = tripped.iter().filter(|other| is_at_once(other)).count() >= MANY;
     let (one_cause, apart): (Vec<&RecordView>, Vec<&RecordView>) = tripped.into_iter().partition(|other| {

@@ -163,13 +163,13 @@ fn a_load_that_rose_is_told_by_the_current_where_nothing_is_recorded() {
 }
 
 impl Written {
-    fn shown(&mut self, set: Set, seen: crate::tracker::Seen) {
+    pub(super) fn shown(&mut self, set: Set, seen: crate::tracker::Seen) {
         let at = super::on_wall(seen.at);
         let shown = vec![Shown { drive: "pump 1".into(), set, seen }];
         self.archive.take(Batch { shown, ..Batch::default() }, at);
     }
 
-    fn slow_set(&mut self, quantity: Quantity, read: &[(i64, i64)]) {
+    pub(super) fn slow_set(&mut self, quantity: Quantity, read: &[(i64, i64)]) {
         let mut tracker = Tracker::default();
         for (at, count) in read {
             let seen = tracker.see(*at, 20_000, &[(quantity, *count)]).unwrap();

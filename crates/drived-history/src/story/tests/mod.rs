@@ -3,7 +3,9 @@
 
 mod causes;
 mod nights;
+mod outsider;
 mod returns;
+mod stops;
 mod written;
 
 use std::time::Duration;
@@ -203,8 +205,13 @@ impl Written {
         self.archive.begin_run(&mut self.store.connection, "test").unwrap();
     }
 
-    fn told(mut self, at: i64) -> Story {
-        self.archive.end_run(&mut self.store.connection, on_wall(900_000)).unwrap();
+    fn told(self, at: i64) -> Story {
+        self.told_until(at, 900_000)
+    }
+
+    /// Likewise of what is kept until then.
+    fn told_until(mut self, at: i64, end: i64) -> Story {
+        self.archive.end_run(&mut self.store.connection, on_wall(end)).unwrap();
         tell(&self.store.connection, "pump 1", NIGHT_MS + at).unwrap()
     }
 }

@@ -34,7 +34,7 @@ fn a_trip_by_the_watchdog_behind_a_cut_line_is_told_by_the_silence_and_never_by_
     assert!(story.about.as_ref().unwrap().text.contains("5 SLF"), "{story:?}");
     let (seen, likely) = (story.why(Certainty::Seen), story.why(Certainty::Likely));
     assert!(
-        seen.contains("it had not answered before")
+        seen.contains("nothing had been heard of it before")
             && seen.contains("pump 1, pump 2 of its line fell silent with it"),
         "{story:?}"
     );

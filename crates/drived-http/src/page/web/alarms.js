@@ -131,11 +131,12 @@ function makeItem() {
 
   /** What would be refused is not offered. */
   function offer(alarm) {
-    const acts = mayAct(alarm) ? [waits(alarm) && 'acknowledge', isActive(alarm) && !alarm.shelved && !alarm.of_motion && !alarm.suppressed_by && 'shelve', alarm.shelved && 'unshelve'].filter(Boolean) : [];
+    const acts = mayAct(alarm) ? [waits(alarm) && 'acknowledge', isActive(alarm) && !alarm.shelved && !alarm.of_motion && !alarm.suppressed_by && 'shelve', alarm.shelved && 'unshelve',
+      alarm.kind === 'maintenance' && isActive(alarm) && 'maintained'].filter(Boolean) : [];
     const now = `${acts.join()} ${title.textContent}`;
     if (now === offered) return;
     offered = now;
-    const act = { acknowledge: () => acknowledge([shown]), shelve: () => shelve(shown), unshelve: () => send(shown, 'unshelve', {}) };
+    const act = { acknowledge: () => acknowledge([shown]), shelve: () => shelve(shown), unshelve: () => send(shown, 'unshelve', {}), maintained: () => maintained(shown) };
     buttons.replaceChildren(...acts.map(name => el('button', { type: 'button', 'data-act': name, onclick: act[name], 'aria-label': t(`${name}_of`, { what: title.textContent }) }, t(name))));
   }
 }
@@ -167,12 +168,19 @@ async function shelve(alarm) {
   await send(alarm, 'shelve', { minutes: Number(time.value), why: why.value.trim() });
 }
 
+/** What an alarm of maintenance asks for was done: it is counted from now on. */
+async function maintained(alarm) {
+  const note = el('textarea', { maxlength: LONGEST_NOTE, rows: 3 });
+  if (!await filled(named(ofWhat(alarm), alarmText(alarm)), t('maintained_yes'), el('p', {}, t('maintained_about')), el('label.field', {}, t('alarm_note'), note))) return;
+  await send(alarm, 'done', note.value.trim() ? { note: note.value.trim() } : {});
+}
+
 async function send(alarm, act, body) {
   const what = named(ofWhat(alarm), alarmText(alarm));
   try {
     const now = await post(path('alarms', alarm.id, act), body);
     takeAlarm(now);
-    say(t('alarm_done', { what, state: word(now.state === 'over' || act === 'acknowledge' ? 'acknowledged' : now.state) }));
+    say(act === 'done' ? t('maintained_done', { what }) : t('alarm_done', { what, state: word(now.state === 'over' || act === 'acknowledge' ? 'acknowledged' : now.state) }));
   } catch (problem) {
     say(t('alarm_not_done', { what, why: problem.isUnheard ? t('not_reached') : told(problem.message) }), true);
   }

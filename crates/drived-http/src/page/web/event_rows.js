@@ -1,5 +1,6 @@
 // What has happened, as rows of a table and of a file: the same from the stream and from the history.
 
+import { alarmText } from './alarm_words.js';
 import { arrange, download, el, setText } from './dom.js';
 import { clock, duration } from './format.js';
 import { language, named, t } from './texts.js';
@@ -57,5 +58,7 @@ export function cells(event) {
 /** A record of the history as the event or command that it was told as. */
 export function ofRecord({ kind, what, drive, line, text, alarm, body, number, time_unix_ms: time }) {
   const was = kind === 'command' || kind === 'event' ? body : undefined;
-  return { drive, line, text, event: what, ...was, alarm: was?.alarm ?? alarm, number, kind: kind === 'command' && was ? kind : 'event', time_unix_ms: time };
+  // An alarm is told by what it is, in the language of the page.
+  const said = kind === 'alarm' && body?.kind ? alarmText(body) : text;
+  return { drive, line, text: said, event: what, ...was, alarm: was?.alarm ?? alarm, number, kind: kind === 'command' && was ? kind : 'event', time_unix_ms: time };
 }

@@ -40,6 +40,7 @@ export function command(given) {
 export function eventText(happened) {
   const { event, text = '' } = happened;
   if (event === 'line_finding' && language() === 'fr') return findingText(happened);
+  if (event === 'connected' && happened.status && language() === 'fr') return connectedText(happened.status);
   const kind = String(event).replaceAll('_', ' ');
   const rest = text.startsWith(kind) ? text.slice(kind.length).replace(/^[:,]? /, '') : text;
   const change = rest.match(/^(\w+) to (\w+)$/);
@@ -51,6 +52,11 @@ export function eventText(happened) {
     return named(`${command({ command: what })}, ${told(who)}`, became);
   }
   return told(rest);
+}
+
+/** How a drive was when it was heard again. */
+function connectedText(status) {
+  return [word(status.state), frequencyText(status), currentText(status), status.control && word(status.control)].filter(Boolean).join(', ');
 }
 
 /** What a line has found, or does not find any more. */

@@ -61,10 +61,16 @@ enum Written {
         issued_unix_ms: Option<u64>,
         alarms: Vec<SeenAlarm>,
     },
+    Done {
+        id: Option<String>,
+        issued_unix_ms: Option<u64>,
+        alarms: Vec<SeenAlarm>,
+        note: Option<String>,
+    },
 }
 
 impl AlarmsSaid {
-    /// An object with its `action`: `acknowledge`, `shelve` or `unshelve`.
+    /// An object with its `action`: `acknowledge`, `shelve`, `unshelve` or, of maintenance, `done`.
     pub fn of(text: &str) -> Self {
         let object = match object(text.as_bytes()) {
             Ok(object) => object,
@@ -97,6 +103,9 @@ impl AlarmsSaid {
             }
             Written::Unshelve { id, issued_unix_ms, alarms } => {
                 (id, issued_unix_ms, alarms, AlarmAct::Unshelve)
+            }
+            Written::Done { id, issued_unix_ms, alarms, note } => {
+                (id, issued_unix_ms, alarms, AlarmAct::Done { note })
             }
         };
         let malformed = |why: String| Err(Unclear::Malformed(why));

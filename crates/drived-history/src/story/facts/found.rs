@@ -1,0 +1,101 @@
+//! What is found among the records: what was done to a drive, by whom, and what it said of it.
+
+use drived_plant::plant::past::RecordView;
+
+use super::{
+    super::body::{Body, Cause, OfOne, OfSeveral, body},
+    Facts, SEEN_AGAIN_MS,
+};
+
+impl Facts {
+    /// Whether a record is of this drive: what happened to it, or a command that was for it too.
+    pub(in crate::story) fn is_of_drive(&self, found: &RecordView) -> bool {
+        found.drive.as_deref() == Some(&*self.drive) || self.of_several(found).is_some()
+    }
+
+    /// What became of a command for several at this drive.
+    pub(in crate::story) fn of_several(&self, found: &RecordView) -> Option<OfOne> {
+        if found.kind != "command" || found.drive.is_some() {
+            return None;
+        }
+        let several: OfSeveral = serde_json::from_str(found.body.as_ref()?.get()).ok()?;
+        several.drives.into_iter().find(|one| one.drive.as_deref() == Some(&*self.drive))
+    }
+
+    /// What the drive said of a trip, where that was read.
+    pub(in crate::story) fn explained(&self, trip: &RecordView) -> Option<&RecordView> {
+        let of_same = |found: &&RecordView| found.number > trip.number && found.drive == trip.drive;
+        // What is explained behind the next trip is that one.
+        let mut own = self.records.iter().filter(of_same).take_while(|found| found.what != "tripped");
+        own.find(|found| found.what == "trip_explained").filter(|_| trip.what == "tripped")
+    }
+
+    /// Whose doing an event was. What followed an act of the program it once told as the doing of that, and such records are kept: a policy that
+    /// can do nothing of the kind, or that acted long before, did not do it.
+    pub(in crate::story) fn cause_of(&self, found: &RecordView) -> Option<Cause> {
+        let Body { cause, from, .. } = body(found);
+        let Some(Cause::Policy { policy }) = &cause else { return cause };
+        let acted = || {
+            self.records.iter().rev().any(|act| {
+                act.what == "command"
+                    && act.drive == found.drive
+                    && (found.time_unix_ms - SEEN_AGAIN_MS..=found.time_unix_ms).contains(&act.time_unix_ms)
+                    && matches!(body(act).cause, Some(Cause::Policy { policy: other }) if other == *policy)
+            })
+        };
+        let ends_run = matches!(from.as_deref(), Some("running" | "stopping" | "quick_stop"));
+        let can = match &*found.what {
+            "fault_cleared" => policy == "on_fault",
+            // Where the output was cut there was no run to be ended.
+            "state_changed" if policy == "output_blocked" => false,
+            "state_changed" => ends_run || acted(),
+            _ => true,
+        };
+        if can { cause } else { Some(Cause::Drive) }
+    }
+
+    /// The trip by which the output of a drive was off when its stop was confirmed: the stop did not bring it to a standstill.
+    pub(in crate::story) fn trip_behind(&self, confirmed: &RecordView) -> Option<&RecordView> {
+        let own = self.records.iter().rev().filter(|found| {
+            found.kind == "event" && found.drive == confirmed.drive && found.number < confirmed.number
+        });
+        let ends_fault = |found: &RecordView| match &*found.what {
+            "fault_cleared" => true,
+            "state_changed" => body(found).to.as_deref() != Some("fault"),
+            "connected" => body(found).status.unwrap_or_default().state.as_deref() != Some("fault"),
+            _ => false,
+        };
+        let mut own = own.take_while(|found| !ends_fault(found));
+        own.find(|found| found.what == "tripped").filter(|_| confirmed.what == "stop_confirmed")
+    }
+
+    /// The drive's own record of its faults, where it was read behind a trip.
+    pub(in crate::story) fn own_record(&self, trip: &RecordView) -> Option<&RecordView> {
+        let later = self.records.iter().filter(|found| found.number > trip.number && self.is_of_drive(found));
+        later.take_while(|found| found.what != "tripped").find(|found| found.what == "fault_record")
+    }
+
+    /// An event in words, a trip with what the drive said of it.
+    pub(in crate::story) fn in_words(&self, found: &RecordView) -> String {
+        let explained =
+            self.explained(found).map(|explained| explained.text.replacen("trip explained", "tripped", 1));
+        explained.unwrap_or_else(|| found.text.clone())
+    }
+
+    /// Events of this name at other drives, not farther from a moment than this.
+    pub(in crate::story) fn elsewhere(&self, what: &str, at: i64, within: i64) -> Vec<&RecordView> {
+        let is_one = |found: &&RecordView| {
+            found.kind == "event"
+                && found.what == what
+                && found.drive.as_deref().is_some_and(|drive| drive != self.drive)
+                && (found.time_unix_ms - at).abs() <= within
+        };
+        self.records.iter().filter(is_one).collect()
+    }
+}
+
+/// When something began: a loss with the silence, and not when patience was over.
+pub(in crate::story) fn begins(found: &RecordView) -> i64 {
+    let silent = if found.what == "lost" { body(found).silent_for_ms.unwrap_or_default() } else { 0 };
+    found.time_unix_ms - i64::try_from(silent).unwrap_or_default()
+}
