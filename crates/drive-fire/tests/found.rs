@@ -88,6 +88,7 @@ fn no_story_that_was_a_find_is_one_again() {
     for (line, what) in [
         ("5.4.0.o5.l3.o8.o10", "freewheel behind a ramp: told at rest at 5 Hz, as if the ramp had ended"),
         ("3.4.0.o13.e14.e12", "released to the terminals, which start it: the stories were wrong"),
+        ("8.3.0.o5.l2.o8.e10.o1.l1", "a V20 whose output is cut in a ramp: told at rest at 6.7 Hz"),
     ] {
         let story = Story::read(line).expect("it is a story");
         let lived = tell(&story, &*drive_of(story.subject.family()));
