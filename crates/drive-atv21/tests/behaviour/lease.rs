@@ -140,7 +140,8 @@ async fn a_keypad_that_runs_it_at_45_hz_is_told_with_the_next_status() {
 /// the two runs on a motor that did not run by then.
 #[tokio::test(start_paused = true)]
 async fn a_stop_is_not_confirmed_at_a_motor_that_the_keypad_takes_and_runs_on_amid_it() {
-    for milliseconds in (20..=100).step_by(10) {
+    // FE45 is answered by 75 ms; who takes it later does so behind the reading.
+    for milliseconds in (20..=70).step_by(10) {
         let (rig, mut drive) = running().await;
         rig.machine.reading("LOC", "runs-on").unwrap();
         let (stopped, ()) = tokio::join!(drive.stop(StopMode::Ramp), async {
