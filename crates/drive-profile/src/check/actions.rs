@@ -255,6 +255,7 @@ impl Check<'_> {
             );
         }
         self.runs_nothing(name, action);
+        self.leaves_nothing_running(name, action);
         if action.get_ref().seen.as_ref().is_none_or(|seen| seen.get_ref().is_empty()) {
             self.refuse(
                 &action.span(),
@@ -443,6 +444,7 @@ impl Check<'_> {
             let stops = file.actions().filter(|(name, _)| name.starts_with("stop."));
             stops.flat_map(|(_, stop)| file.writes(stop.get_ref())).any(|stop| stop == written)
         };
+        let ramp = file.stop.ramp.given().and_then(|ramp| file.writes(ramp.get_ref()).first().copied());
         let mut all = file.actions().filter(|(name, _)| name.starts_with("stop."));
         let wrong = all.any(|(_, stop)| file.writes(stop.get_ref()).into_iter().any(|of| file.runs(of)));
         match action.clears_itself {
@@ -454,8 +456,18 @@ impl Check<'_> {
             // A stop that runs the motor is told of the stop.
             Some(false) if !last.is_some_and(stops) && !wrong => self.refuse(
                 &reset.span(),
-                "the reset is left standing: some drives reset again and again, or restart",
-                "a last step with the word of a stop",
+                match last {
+                    Some(last) => format!(
+                        "the reset is left standing: it ends with {:04X}h, which is no word of a stop, and some drives reset again and \
+                         again, or restart",
+                        last.value
+                    ),
+                    None => "the reset is left standing: some drives reset again and again, or restart".to_owned(),
+                },
+                match ramp {
+                    Some(ramp) => format!("a last step with the word of a stop, such as {:04X}h of stop.ramp", ramp.value),
+                    None => "a last step with the word of a stop".to_owned(),
+                },
             ),
             Some(_) => {}
         }
