@@ -26,6 +26,7 @@ mod twin;
 
 use std::{
     cmp::Ordering,
+    collections::BTreeMap,
     fmt,
     hash::{Hash, Hasher},
     str::FromStr,
@@ -53,6 +54,9 @@ pub struct Family(pub(crate) &'static Definition);
 
 /// Families from outside that a program knows by name.
 static ADDED: RwLock<Vec<Family>> = RwLock::new(Vec::new());
+
+/// Names that are no families, or not those that a file was to say, and why.
+static LEFT_OUT: RwLock<BTreeMap<String, String>> = RwLock::new(BTreeMap::new());
 
 impl Family {
     /// Schneider Altivar 21.
@@ -108,6 +112,22 @@ impl Family {
             }
         }
         Ok(())
+    }
+
+    /// That a name which somebody may mean is no family's, and why; `None`: nothing is wrong with it any more.
+    pub fn leave_out(name: &str, why: Option<String>) {
+        let mut left_out = LEFT_OUT.write().unwrap_or_else(PoisonError::into_inner);
+        match why {
+            Some(why) => left_out.insert(name.to_ascii_lowercase(), why),
+            None => left_out.remove(&name.to_ascii_lowercase()),
+        };
+    }
+
+    /// Why a name is no family's, or is not the one that a file was to say, where that was told by [`leave_out`](Self::leave_out).
+    #[must_use]
+    pub fn why_left_out(name: &str) -> Option<String> {
+        let left_out = LEFT_OUT.read().unwrap_or_else(PoisonError::into_inner);
+        left_out.get(&name.to_ascii_lowercase()).cloned()
     }
 
     /// All that this program knows by name: those that are [built in](Self::BUILT_IN), then those that were added.
@@ -229,8 +249,16 @@ pub struct NameTaken(pub &'static str);
 
 /// A name that is no family's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is not a family of drives: expected one of {keys}", keys = keys())]
+#[error("{0:?} is not a family of drives{why}", why = why_not(.0))]
 pub struct UnknownFamily(pub String);
+
+/// Why a name is no family's, where that was told; else the names that are.
+fn why_not(name: &str) -> String {
+    match Family::why_left_out(name) {
+        Some(why) => format!(": {why}"),
+        None => format!(": expected one of {}", keys()),
+    }
+}
 
 fn keys() -> String {
     Family::all().iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")

@@ -1,21 +1,19 @@
 //! The ladder: with what a drive can be trusted by its profile, and what keeps it from more.
 
+mod doubts;
+mod tried;
+
 use std::fmt;
 
 use crate::format::Spanned;
 
 use crate::{
-    format::{Action, Answer, FedBy, File, Proves, Setpoint, Space, StateIs, StateName, Storage, UnitName},
-    scale::hundredths,
+    format::{Action, Answer, FedBy, File, Guard, Proves, Space, StateIs, StateName, Storage},
     source::{asked, grade, line},
 };
 
 /// Registers of commands that several makers have, each with words of its own: what stops one maker's drive runs another's.
 const SHARED: &[u16] = &[0x1000, 0x2000];
-
-/// The highest setpoint that is no slip of a scale: faster than any spindle that these drives turn, and more than any full scale allows.
-const HIGHEST_HERTZ: i64 = 1_000;
-const HIGHEST_PERCENT: i64 = 400;
 
 /// Of so many bits each combination is looked at.
 const FEW_BITS: u32 = 8;
@@ -67,8 +65,8 @@ impl fmt::Display for Gap {
 }
 
 /// The level of a file that was checked, and its gaps: first what keeps it from the next level.
-pub(crate) fn climb(text: &str, file: &File) -> (Level, Vec<Gap>) {
-    let mut ladder = Ladder { text, file, gaps: Vec::new() };
+pub(crate) fn climb(text: &str, file: &File, substance: &str) -> (Level, Vec<Gap>) {
+    let mut ladder = Ladder { text, file, substance, gaps: Vec::new() };
     ladder.stop();
     ladder.motion();
     ladder.said();
@@ -83,9 +81,24 @@ pub(crate) fn climb(text: &str, file: &File) -> (Level, Vec<Gap>) {
     (level, gaps)
 }
 
+/// The word of a state, as a file has it.
+pub(crate) const fn word(state: StateName) -> &'static str {
+    match state {
+        StateName::NotReady => "not_ready",
+        StateName::Disabled => "disabled",
+        StateName::Ready => "ready",
+        StateName::Running => "running",
+        StateName::Stopping => "stopping",
+        StateName::QuickStop => "quick_stop",
+        StateName::FaultReaction => "fault_reaction",
+        StateName::Fault => "fault",
+    }
+}
+
 struct Ladder<'a> {
     text: &'a str,
     file: &'a File,
+    substance: &'a str,
     gaps: Vec<Gap>,
 }
 
@@ -94,6 +107,7 @@ impl<'a> Ladder<'a> {
         let file = self.file;
         let link = file.link.get_ref();
         self.sound(Level::Stop, "the line and its functions", &link.source);
+        self.numbering();
         let stops: Vec<_> = file.actions().filter(|(name, _)| name.starts_with("stop.")).collect();
         if stops.is_empty() {
             self.ask(
@@ -120,7 +134,7 @@ impl<'a> Ladder<'a> {
         }
         for is in &file.state.is {
             let bits = is.get_ref().bits.get_ref();
-            self.sound(Level::Motion, &format!("state {:?}", is.get_ref().state), &bits.source);
+            self.sound(Level::Motion, &format!("state \"{}\"", word(is.get_ref().state)), &bits.source);
             self.register(Level::Motion, bits.register.get_ref());
         }
         let starts =
@@ -159,30 +173,6 @@ impl<'a> Ladder<'a> {
         }
     }
 
-    /// How fast it would turn at the highest that its setpoint may be.
-    fn highest(&mut self, setpoint: &Spanned<Setpoint>) {
-        let fact = setpoint.get_ref();
-        let Some(register) = self.file.named(fact.register.get_ref()) else { return };
-        let Some([numerator, denominator]) = register.scale.as_ref().map(|scale| *scale.get_ref()) else {
-            return;
-        };
-        let most = match register.unit {
-            UnitName::Hertz => HIGHEST_HERTZ,
-            UnitName::Percent => HIGHEST_PERCENT,
-            _ => return,
-        };
-        let high = hundredths(fact.limits.get_ref().high.into(), numerator, denominator);
-        if high > most * 100 {
-            let (unit, limits) = (register.unit.symbol(), fact.limits.span().start);
-            self.keep(
-                Level::Motion,
-                limits,
-                &format!("its setpoint would go up to {}.{:02} {unit}", high / 100, high % 100),
-                "is the scale of its register right, and what is the highest that the manual allows?",
-            );
-        }
-    }
-
     /// A way to see the setpoint or the output.
     fn seen(&mut self) {
         let see = &self.file.see;
@@ -197,6 +187,9 @@ impl<'a> Ladder<'a> {
         }
         for name in ways {
             self.register(Level::Motion, name.get_ref());
+            if let Some(register) = self.file.named(name.get_ref()) {
+                self.coarse(name.get_ref(), register);
+            }
         }
         match (&see.direction, &self.file.start.reverse) {
             (Answer::Given(direction), _) => {
@@ -356,7 +349,9 @@ impl<'a> Ladder<'a> {
             ),
         }
         let told = file.who.fingerprints.given().is_some_and(|all| {
-            !all.is_empty() && all.iter().all(|of| grade(file, &of.get_ref().source).is_sound())
+            // What may not be one number tells nothing: most registers of most drives are another.
+            let tells = |of: &Spanned<Guard>| of.get_ref().is.is_some();
+            all.iter().any(tells) && all.iter().all(|of| grade(file, &of.get_ref().source).is_sound())
         });
         let setpoint = file.setpoint.given().and_then(|of| file.named(of.get_ref().register.get_ref()));
         let commanded = file.actions().flat_map(|(_, action)| file.writes(action.get_ref()));
@@ -364,7 +359,7 @@ impl<'a> Ladder<'a> {
             .map(|written| (written.space, written.address))
             .chain(setpoint.and_then(|register| file.place(register)))
             .any(|(space, address)| space == Space::HoldingRegister && SHARED.contains(&address));
-        if shared && !told && !self.is_tried() {
+        if shared && !told && !self.is_tried(Level::Motion) {
             self.ask(Level::Motion, "fingerprints",
                 "its command stands where other makers have other words, and nothing tells this drive from theirs",
                 "which register only this drive reads so? Or a person tries it on the drive, by name, under [[tried]]",
@@ -376,6 +371,7 @@ impl<'a> Ladder<'a> {
     fn said(&mut self) {
         let file = self.file;
         self.uncovered();
+        self.trials();
         match &file.watchdog {
             Answer::Given(watchdog) => {
                 let watchdog = watchdog.get_ref();
@@ -434,10 +430,6 @@ impl<'a> Ladder<'a> {
         }
     }
 
-    fn is_tried(&self) -> bool {
-        self.file.tried.given().is_some_and(|tried| !tried.is_empty())
-    }
-
     /// An action, and the registers that it writes.
     fn action(&mut self, level: Level, name: &str, action: &'a Spanned<Action>) {
         self.sound(level, name, &action.get_ref().source);
@@ -460,7 +452,7 @@ impl<'a> Ladder<'a> {
     /// A fact on which a level rests.
     fn sound(&mut self, level: Level, what: &str, source: &Spanned<String>) {
         let mark = grade(self.file, source);
-        let settled = mark == crate::format::Mark::X && self.is_tried();
+        let settled = mark == crate::format::Mark::X && self.is_tried(level);
         if !mark.is_sound() && !settled {
             self.keep(
                 level,
@@ -471,14 +463,9 @@ impl<'a> Ladder<'a> {
         }
     }
 
-    /// Where a question stands in the file.
-    fn of(&self, key: &str) -> usize {
-        asked(self.text, key)
-    }
-
     /// What keeps from a level until a question of the file is answered.
     fn ask(&mut self, level: Level, key: &str, what: &str, question: &str) {
-        self.keep(level, self.of(key), what, question);
+        self.keep(level, asked(self.text, key).unwrap_or(0), what, question);
     }
 
     fn keep(&mut self, level: Level, at: usize, what: &str, question: &str) {

@@ -31,6 +31,7 @@ mod requests;
 mod scale;
 pub mod shipped;
 mod source;
+mod substance;
 
 #[cfg(feature = "schemars")]
 pub use format::schema;

@@ -25,6 +25,7 @@ pub struct Profile {
     pub(crate) level: Level,
     pub(crate) gaps: Vec<Gap>,
     pub(crate) digest: String,
+    pub(crate) substance: String,
 }
 
 /// One register or coil of a write.
@@ -59,6 +60,12 @@ impl Profile {
     #[must_use]
     pub fn digest(&self) -> &str {
         &self.digest
+    }
+
+    /// The SHA-256 of what decides how its drive is read, stopped and started: what a trial tries. Names, remarks and sources are none of it.
+    #[must_use]
+    pub fn substance(&self) -> &str {
+        &self.substance
     }
 
     /// What the drive can be trusted with by this profile.

@@ -12,17 +12,17 @@ pub(crate) fn line(text: &str, span: &Range<usize>) -> usize {
     before.bytes().filter(|byte| *byte == b'\n').count() + 1
 }
 
-/// Where a question stands in a text, by its key or as a table of its own; the beginning where it does not.
-pub(crate) fn asked(text: &str, key: &str) -> usize {
+/// Where a question stands in a text, by its key or as a table of its own.
+pub(crate) fn asked(text: &str, key: &str) -> Option<usize> {
     let mut at = 0;
     for line in text.split_inclusive('\n') {
         let is_key = line.strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='));
         if is_key || line.trim_end() == format!("[{key}]") {
-            return at;
+            return Some(at);
         }
         at += line.len();
     }
-    0
+    None
 }
 
 /// The names in a text of sources.

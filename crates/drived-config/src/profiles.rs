@@ -4,7 +4,7 @@
 //! the one with which it was opened.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     ffi::OsStr,
     fmt, fs,
     io::Read as _,
@@ -47,28 +47,73 @@ pub fn ship() -> Result<(), NameTaken> {
     Ok(())
 }
 
-/// The profiles of a folder, by their keys.
+/// The profiles of a folder, by their keys, and what of it is left out.
 #[derive(Debug, Clone, Default)]
 pub struct Folder {
     files: BTreeMap<String, PathBuf>,
+    left_out: Vec<ProfilesError>,
 }
 
 impl Folder {
     /// Reads every `.toml` in a folder and in the folders in it, and makes what they say known in place of what they said before.
     ///
+    /// A file that is no profile, or whose key another has, is left out alone: the motors of the others have to be stopped. Whoever
+    /// names a drive of it is told why.
+    ///
     /// # Errors
-    /// A file that is no profile, a name that is taken, a folder that cannot be read; nothing becomes known then.
+    /// A folder that cannot be read.
     pub fn read(folder: &Path) -> Result<Self, ProfilesError> {
-        let (read, wrong) = look(folder)?;
-        if let Some(first) = wrong.into_iter().next() {
-            return Err(first);
+        let mut left_out = Vec::new();
+        let mut read: BTreeMap<String, (PathBuf, Profile)> = BTreeMap::new();
+        let mut twice = BTreeSet::new();
+        for file in files(folder)? {
+            match profile(&file) {
+                Ok(profile) => {
+                    let key = profile.key().to_owned();
+                    if let Some((other, _)) = read.insert(key.clone(), (file.clone(), profile)) {
+                        twice.insert(key.clone());
+                        left_out.push(ProfilesError::Twice { key, file, other });
+                    }
+                }
+                Err(error) => left_out.push(error),
+            }
         }
+        // Which of two is meant nobody can tell: neither is taken.
+        read.retain(|key, _| !twice.contains(key));
         let mut files = BTreeMap::new();
         for (key, (file, profile)) in read {
-            known_from(profile, &file)?;
-            files.insert(key, file);
+            if is_taken(&key) {
+                left_out.push(ProfilesError::Taken { key, file });
+                continue;
+            }
+            match take_up(Arc::new(profile), &file) {
+                Ok(()) => {
+                    Family::leave_out(&key, None);
+                    files.insert(key, file);
+                }
+                Err(taken) => left_out.push(ProfilesError::Taken { key: taken.0.to_owned(), file }),
+            }
         }
-        Ok(Self { files })
+        for error in &left_out {
+            if let Some(key) = error.key().filter(|key| !files.contains_key(key)) {
+                Family::leave_out(&key, Some(error.to_string()));
+            }
+        }
+        Ok(Self { files, left_out })
+    }
+
+    /// What is left out, each with its file and why.
+    #[must_use]
+    pub fn left_out(&self) -> &[ProfilesError] {
+        &self.left_out
+    }
+
+    /// Why the drives of a family cannot be driven by this folder, although something is known of them: its file is left out.
+    #[must_use]
+    pub fn why_not(&self, family: Family) -> Option<String> {
+        let key = family.capabilities().key;
+        let error = self.left_out.iter().find(|error| error.key().is_some_and(|of| of == key))?;
+        (!self.files.contains_key(key)).then(|| error.to_string())
     }
 
     /// Whether a family may be used by whoever reads this folder: one that comes from a file comes from one that is still there.
@@ -85,47 +130,12 @@ impl Folder {
     }
 }
 
-/// Reads the folder that the environment names, if it names one, and gives what is wrong there. Each file that is right becomes known all
-/// the same: one that is not keeps nobody from stopping the drive of another. Of two with one key the first by its path counts.
-#[must_use]
-pub fn of_environment() -> Vec<ProfilesError> {
-    let Some(folder) = folder_of_environment() else { return Vec::new() };
-    let (read, mut wrong) = match look(&folder) {
-        Ok(read) => read,
-        Err(error) => return vec![error],
-    };
-    wrong.extend(read.into_values().filter_map(|(file, profile)| known_from(profile, &file).err()));
-    wrong
-}
-
-/// The profiles of a folder by their keys, each with its file, and what is wrong with the others.
-type Looked = (BTreeMap<String, (PathBuf, Profile)>, Vec<ProfilesError>);
-
-fn look(folder: &Path) -> Result<Looked, ProfilesError> {
-    let (mut read, mut wrong) = Looked::default();
-    for file in files(folder)? {
-        let profile = match profile(&file) {
-            Ok(profile) => profile,
-            Err(error) => {
-                wrong.push(error);
-                continue;
-            }
-        };
-        let key = profile.key().to_owned();
-        if let Some((other, _)) = read.get(&key) {
-            wrong.push(ProfilesError::Twice { key, file, other: other.clone() });
-        } else if is_taken(&key) {
-            wrong.push(ProfilesError::Taken { key, file });
-        } else {
-            read.insert(key, (file, profile));
-        }
-    }
-    Ok((read, wrong))
-}
-
-fn known_from(profile: Profile, file: &Path) -> Result<(), ProfilesError> {
-    let taken = |taken: NameTaken| ProfilesError::Taken { key: taken.0.to_owned(), file: file.to_owned() };
-    take_up(Arc::new(profile), file).map_err(taken)
+/// Reads the folder that the environment names, if it names one, and gives what is left out of it.
+///
+/// # Errors
+/// As [`Folder::read`].
+pub fn of_environment() -> Result<Vec<ProfilesError>, ProfilesError> {
+    folder_of_environment().map_or(Ok(Vec::new()), |folder| Folder::read(&folder).map(|read| read.left_out))
 }
 
 fn folder_of_environment() -> Option<PathBuf> {
@@ -226,7 +236,8 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ProfilesError> {
 }
 
 /// Whether a name belongs to what is no file.
-fn is_taken(key: &str) -> bool {
+#[must_use]
+pub fn is_taken(key: &str) -> bool {
     match of(key) {
         Some(known) => known.file.is_none(),
         None if shipped::find(key).is_some() => true,
@@ -296,6 +307,25 @@ pub enum ProfilesError {
     },
 }
 
+impl ProfilesError {
+    /// The key by which somebody may name the drives of it. Of a file that is no profile it is what a line of it says, or the file's name.
+    fn key(&self) -> Option<String> {
+        match self {
+            Self::Taken { key, .. } | Self::Twice { key, .. } => Some(key.clone()),
+            Self::File { file, .. } => Some(file.file_stem()?.to_str()?.to_owned()),
+            Self::Refused { file, .. } => {
+                let text = text(file).unwrap_or_default();
+                let said = text.lines().find_map(|line| {
+                    let (key, said) = line.split_once('=')?;
+                    (key.trim() == "key").then(|| said.split('"').nth(1).unwrap_or_default().to_owned())
+                });
+                said.filter(|said| !said.is_empty()).or_else(|| Some(file.file_stem()?.to_str()?.to_owned()))
+            }
+            Self::TooMany { .. } => None,
+        }
+    }
+}
+
 impl fmt::Display for ProfilesError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -316,7 +346,7 @@ impl fmt::Display for ProfilesError {
             Self::Twice { key, file, other } => {
                 write!(
                     f,
-                    "{}: {} has the key {key:?} too: give one of them another",
+                    "{}: {} has the key {key:?} too, and neither is taken: give one of them another, or move it out of the folder",
                     file.display(),
                     other.display()
                 )

@@ -94,8 +94,16 @@ pub(super) fn only_plant(source: Source<'_>) -> Result<file::File, ConfigError> 
 pub(super) fn profiles(source: Source<'_>, raw: &file::File, folder: &Folder) -> Result<(), ConfigError> {
     let drives = of(&raw.drives).into_iter().flatten().filter_map(|entry| entry.get_ref().drive.as_ref());
     for drive in drives {
-        if let Some(gone) = drive.get_ref().0.names().find(|name| !folder.has(name.family)) {
-            let problem = format_args!("no profile in the folder says any more what {} is", gone.family);
+        if let Some(gone) = drive
+            .get_ref()
+            .0
+            .names()
+            .find(|name| !folder.has(name.family) || folder.why_not(name.family).is_some())
+        {
+            let problem = match folder.why_not(gone.family) {
+                Some(why) => format!("{} is not driven by its profile: {why}", gone.family),
+                None => format!("no profile in the folder says any more what {} is", gone.family),
+            };
             return Err(source.error(drive.span(), problem));
         }
     }

@@ -30,7 +30,7 @@ use drived_config::config::{
     ConfigError, DriveEntry, Entry as _, Environment, Group, Key, LineEntries, LineEntry, LinePart, Members,
     Source, State, groups, line_part, look_alikes, of,
 };
-use drived_config::profiles::Folder;
+use drived_config::profiles::{Folder, ProfilesError};
 use drived_doors::config::DoorsConfig;
 use drived_face::{Configured, Site, Written};
 use drived_words::failure::Failure;
@@ -62,6 +62,8 @@ pub struct Config {
     pub doors: DoorsConfig,
     pub lines: Vec<LinePart>,
     pub groups: Vec<Group>,
+    /// What is left out of the folder of profiles, and why. No drive here needs it.
+    pub left_out: Vec<ProfilesError>,
     /// Where drives are added at the page; `None`: there is no folder for it.
     pub added: Option<Added>,
     /// The faces that have a table, and those that are there without one, by its name, in the order in which the program knows them.
@@ -166,7 +168,16 @@ impl Config {
             faces.extend(configured.map(|configured| (face.table(), configured)));
         }
         let doors = DoorsConfig::read(source, of(&raw.http), of(&raw.socket), state)?;
-        Ok(Self { doors, faces, snapshots, shutdown, lines, groups, added })
+        Ok(Self {
+            doors,
+            faces,
+            snapshots,
+            shutdown,
+            lines,
+            groups,
+            left_out: profiles.left_out().to_vec(),
+            added,
+        })
     }
 
     /// What the file says of the face with this table; `None`: nothing.
@@ -174,8 +185,14 @@ impl Config {
         self.faces.iter().find(|(name, _)| *name == table).map(|(_, face)| &**face)
     }
 
-    /// Names that somebody may take for others.
+    /// What is left out of the folder of profiles, and names that somebody may take for others.
     pub fn doubts(&self) -> Vec<String> {
+        let left_out = self.left_out.iter().map(|why| format!("a profile is left out: {why}"));
+        left_out.chain(self.doubtful_names()).collect()
+    }
+
+    /// Names that somebody may take for others.
+    fn doubtful_names(&self) -> Vec<String> {
         self.names()
             .into_iter()
             .flat_map(|(kind, names)| look_alikes::doubts(kind, names.into_iter()))
@@ -190,7 +207,7 @@ impl Config {
             look_alikes::doubts(kind, names.into_iter().filter(|name| of_kind(kind).contains(name)))
         });
         let lived_with: Vec<String> = lived_with.collect();
-        new.doubts().into_iter().find(|doubt| !lived_with.contains(doubt))
+        new.doubtful_names().into_iter().find(|doubt| !lived_with.contains(doubt))
     }
 
     /// The names of each kind: those of drives and groups stand beside each other.

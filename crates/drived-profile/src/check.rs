@@ -31,7 +31,15 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             let number = output::counted(refusals.0.len(), "place is", "places are");
             Err(Failure::Input(format!("{}: {number} refused", args.file.display())))
         }
-        Err(error) => Err(Failure::Input(error.to_string())),
+        Err(error) => {
+            let key = args.file.to_str().filter(|said| profiles::find(said).is_some());
+            Err(Failure::Input(match key {
+                Some(key) => {
+                    format!("{error}; the profile {key} is known, and read: drived profile show {key}")
+                }
+                None => error.to_string(),
+            }))
+        }
     }
 }
 
@@ -63,10 +71,17 @@ fn tell(args: &Args, profile: &Profile) -> Result<(), Failure> {
     let (file, folder) = (args.file.display(), args.file.parent().filter(|of| !of.as_os_str().is_empty()));
     let folder = folder.map_or_else(|| ".".to_owned(), |folder| folder.display().to_string());
     output::say(format_args!("try it on its simulated twin: drived profile try {file} --sim"))?;
-    output::say(format_args!(
-        "use it by its key, {}: DRIVED_PROFILES={folder} drived …, or profiles = \"{folder}\" in a configuration",
-        profile.key()
-    ))?;
+    if profiles::is_taken(profile.key()) {
+        output::say(format_args!(
+            "its key, {}, is the name of a family that this program has: give it another, or it is left out of its folder",
+            profile.key()
+        ))?;
+    } else {
+        output::say(format_args!(
+            "use it by its key, {}: DRIVED_PROFILES={folder} drived …, or profiles = \"{folder}\" in a configuration",
+            profile.key()
+        ))?;
+    }
     if !said.is_empty() {
         output::say("not known, and told to whoever it matters to:")?;
     }

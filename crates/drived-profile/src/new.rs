@@ -36,6 +36,12 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     }
     let Some(file) = &args.to else { return output::say_as_it_is(text.trim_end()) };
     let failed = |error: std::io::Error| Failure::Input(format!("{}: {error}", file.display()));
+    if file.exists() {
+        return Err(Failure::Input(format!(
+            "{}: it is there already, and left alone: name another file, or check this one: drived profile check {0}",
+            file.display()
+        )));
+    }
     let mut open = OpenOptions::new().write(true).create_new(true).open(file).map_err(failed)?;
     open.write_all(text.as_bytes()).map_err(failed)?;
     output::say(format_args!(

@@ -42,8 +42,9 @@ pub fn program() -> ExitCode {
         return cli::end(Err(Failure::Input(taken.to_string())));
     }
     // What is wrong with a file there keeps nobody from stopping another drive.
-    for wrong in profiles::of_environment() {
-        output::complain(format_args!("{}: {wrong}", profiles::ENVIRONMENT));
+    let left_out = profiles::of_environment().unwrap_or_else(|wrong| vec![wrong]);
+    for wrong in left_out {
+        output::complain(format_args!("{}: left out: {wrong}", profiles::ENVIRONMENT));
     }
     let cli = match cli::Cli::try_parse() {
         Ok(cli) => cli,

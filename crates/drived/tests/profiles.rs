@@ -362,9 +362,19 @@ fn a_configuration_whose_folder_or_name_cannot_be_is_refused_with_the_line() {
         let file = File::new("refused-profiles", &text.replacen(place, by, 1));
         run(&["check", "--config", file.path()]).assert_refused(2, reason);
     }
+    // A file that no drive needs is left out, and said. One that a drive needs keeps it from being driven, by the file's own error.
     fs::write(folder.0.join("v20.toml"), OWN.replace("key = \"goodrive\"", "key = \"v20\""))
         .expect("it can be written");
+    fs::write(folder.0.join("other.toml"), "key = \"half-written\"\nformat 1\n").expect("it can be written");
     let file = File::new("refused-taken", &text);
-    run(&["check", "--config", file.path()])
-        .assert_refused(2, "is the name of a family that this program has");
+    let checked = run(&["check", "--config", file.path()]);
+    let said = format!("{}{}", checked.assert_done(), checked.err);
+    assert!(said.contains("is the name of a family that this program has"), "{said}");
+    assert!(said.contains("other.toml:2: "), "{said}");
+    for (drive, reason) in
+        [("v20@3", "v20 is not driven by its profile"), ("half-written@3", "other.toml:2: ")]
+    {
+        let file = File::new("refused-needed", &text.replacen("own-drive@3", drive, 1));
+        run(&["check", "--config", file.path()]).assert_refused(2, reason);
+    }
 }

@@ -255,6 +255,7 @@ impl Check<'_> {
             );
         }
         self.runs_nothing(name, action);
+        self.leaves_nothing_running(name, action);
         if action.get_ref().seen.as_ref().is_none_or(|seen| seen.get_ref().is_empty()) {
             self.refuse(
                 &action.span(),
@@ -443,6 +444,7 @@ impl Check<'_> {
             let stops = file.actions().filter(|(name, _)| name.starts_with("stop."));
             stops.flat_map(|(_, stop)| file.writes(stop.get_ref())).any(|stop| stop == written)
         };
+        let ramp = file.stop.ramp.given().and_then(|ramp| file.writes(ramp.get_ref()).first().copied());
         let mut all = file.actions().filter(|(name, _)| name.starts_with("stop."));
         let wrong = all.any(|(_, stop)| file.writes(stop.get_ref()).into_iter().any(|of| file.runs(of)));
         match action.clears_itself {
@@ -452,17 +454,21 @@ impl Check<'_> {
                 "clears_itself = true or false",
             ),
             // A stop that runs the motor is told of the stop.
-            Some(false) if !last.is_some_and(stops) && !wrong => {
-                let stop = file.actions().find(|(name, _)| name.starts_with("stop."));
-                let stop =
-                    stop.and_then(|(name, stop)| Some((name, file.writes(stop.get_ref()).pop()?.value)));
-                let such = stop.map(|(name, word)| format!(", such as that of {name}, {word:04X}h"));
-                self.refuse(
-                    &reset.span(),
-                    "the reset is left standing, or its last word is that of no stop: some drives reset again and again, or restart",
-                    format!("a last step with the word of a stop{}", such.unwrap_or_default()),
-                );
-            }
+            Some(false) if !last.is_some_and(stops) && !wrong => self.refuse(
+                &reset.span(),
+                match last {
+                    Some(last) => format!(
+                        "the reset is left standing: it ends with {:04X}h, which is no word of a stop, and some drives reset again and \
+                         again, or restart",
+                        last.value
+                    ),
+                    None => "the reset is left standing: some drives reset again and again, or restart".to_owned(),
+                },
+                match ramp {
+                    Some(ramp) => format!("a last step with the word of a stop, such as {:04X}h of stop.ramp", ramp.value),
+                    None => "a last step with the word of a stop".to_owned(),
+                },
+            ),
             Some(_) => {}
         }
         // A reset begins and ends with a stop where the drive wants it so; what it does is the word that is none.

@@ -1,8 +1,11 @@
 //! The checker: what is malformed or lies is refused, each with its line, the reason and what to write.
 
 mod actions;
+mod fingerprints;
 mod registers;
+mod seen;
 mod setpoint;
+mod standing;
 mod states;
 mod text;
 mod who;
@@ -13,10 +16,11 @@ use crate::format::Spanned;
 use ring::digest::SHA256;
 
 use crate::{
-    format::{File, Register, VERSION},
+    format::{File, Mark, Register, VERSION},
     ladder,
     profile::Profile,
     source::{asked, line, names},
+    substance,
 };
 
 /// The longest text that is read, in bytes: ten times the longest profile that is shipped.
@@ -85,8 +89,9 @@ pub fn read(text: &str) -> Result<Profile, Refusals> {
     check.all();
     let mut refusals = check.refusals;
     if refusals.is_empty() {
-        let (level, gaps) = ladder::climb(text, &file);
-        return Ok(Profile { file, level, gaps, digest: digest(text) });
+        let substance = substance::of(text);
+        let (level, gaps) = ladder::climb(text, &file, &substance);
+        return Ok(Profile { file, level, gaps, digest: digest(text), substance });
     }
     refusals.sort_by_key(|refusal| refusal.line);
     refusals.dedup();
@@ -122,6 +127,7 @@ impl<'a> Check<'a> {
         self.link();
         self.texts();
         self.sources();
+        self.tried();
         self.registers();
         if file.register.values().any(|register| file.place(register.get_ref()).is_none()) {
             // Whatever names such a register would be refused for that, and not for what it says.
@@ -138,6 +144,12 @@ impl<'a> Check<'a> {
             let line = line(self.text, at);
             self.refusals.push(Refusal { line, reason: reason.into(), write: write.into() });
         }
+    }
+
+    /// Where the answer to a question stands that says no more than "none" or "unknown".
+    fn line_of(&self, key: &str) -> Option<Range<usize>> {
+        let at = asked(self.text, key)?;
+        Some(at..at)
     }
 
     fn key(&mut self) {
@@ -190,7 +202,7 @@ impl<'a> Check<'a> {
             ("write_coils", &link.write_coils, 1_968),
         ] {
             if limit.given().is_some_and(|limit| !(1..=most).contains(limit)) {
-                let at = asked(self.text, what);
+                let at = asked(self.text, what).unwrap_or(0);
                 self.refuse(
                     &(at..at),
                     format!("{what} is outside of what Modbus allows"),
@@ -208,12 +220,14 @@ impl<'a> Check<'a> {
         {
             self.refuse(&factory.span(), "this is no setting of a line", "one such as \"19200 8E1\"");
         }
-        if link.highest_address.given().is_some_and(|highest| !(1..=247).contains(highest)) {
-            let at = asked(self.text, "highest_address");
+        if let Some(highest) = link.highest_address.given()
+            && !(1..=247).contains(highest.get_ref())
+        {
             self.refuse(
-                &(at..at),
-                "this is no slave address",
-                "highest_address = 1 to 247, also where a manual prints more: Modbus has no others",
+                &highest.span(),
+                "0 is everybody's address, and 248 to 255 are no addresses of Modbus over a serial line, whatever a manual prints: \
+                 nothing is asked there",
+                "highest_address = 247, and give the drive an address of 1 to 247",
             );
         }
     }
@@ -237,11 +251,33 @@ impl<'a> Check<'a> {
         let file = self.file;
         for (name, source) in &file.sources {
             let said = source.get_ref();
-            if said.document.trim().is_empty() || said.page.trim().is_empty() {
+            let is_none = |text: &str| text.trim().is_empty();
+            let is_unknown = |text: &str| matches!(text.trim(), "none" | "unknown");
+            let is_read = matches!(said.mark, Mark::P | Mark::R);
+            if [&said.document, &said.page].into_iter().any(|of| is_none(of) || is_read && is_unknown(of)) {
                 self.refuse(
                     &source.span(),
                     format!("source \"{name}\" names no document or no page"),
-                    "document = \"...\", page = \"...\", so that another can open it",
+                    "document = \"...\", page = \"...\", so that another can open it; mark = \"M\" where nobody can",
+                );
+            }
+        }
+    }
+
+    /// A trial has a day on which it was.
+    fn tried(&mut self) {
+        for tried in self.file.tried.given().into_iter().flatten() {
+            let day = tried.get_ref().day.as_bytes();
+            let is_day = day.len() == 10
+                && day.iter().enumerate().all(|(at, byte)| match at {
+                    4 | 7 => *byte == b'-',
+                    _ => byte.is_ascii_digit(),
+                });
+            if !is_day {
+                self.refuse(
+                    &tried.span(),
+                    format!("\"{}\" is no day on which it was tried", tried.get_ref().day),
+                    "day = year, month and day, such as \"2026-11-24\"",
                 );
             }
         }

@@ -149,7 +149,7 @@ impl Check<'_> {
                 self.refuse(
                     &spanned.span(),
                     format!("{name} and {other} have one address"),
-                    "one of them, or access = \"write\" and the other space where the drive has two",
+                    "one of them alone, and its name wherever the other stood; or the address that the manual prints for it",
                 );
             }
         }

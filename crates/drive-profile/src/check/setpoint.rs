@@ -1,7 +1,7 @@
 //! The setpoint: of a unit that can be turned into counts and back, within limits, in RAM.
 
 use super::Check;
-use crate::format::{Access, UnitName};
+use crate::format::{Access, Spanned, UnitName};
 
 impl Check<'_> {
     pub(super) fn setpoint(&mut self) {
@@ -35,9 +35,19 @@ impl Check<'_> {
         if !is_speed || register.scale.is_none() || register.words.is_some() || register.byte.is_some() {
             self.refuse(
                 &setpoint.register.span(),
-                format!("{} is no speed of one word", setpoint.register.get_ref()),
-                "unit = \"Hz\", \"rpm\" or \"%\" with its scale",
+                format!(
+                    "{} is no setpoint: that is one whole word in Hz, rpm or %, with its scale",
+                    setpoint.register.get_ref()
+                ),
+                "unit = \"Hz\", \"rpm\" or \"%\" and scale = [1, 100] for 0.01 under its register, without `words` and `byte`",
             );
+        }
+        let wanted = [
+            (&limits.high_in, "high_in", register.unit),
+            (&setpoint.full_scale, "full_scale", UnitName::Hertz),
+        ];
+        for (name, key, unit) in wanted {
+            self.counts_in(name.as_ref(), key, unit);
         }
         if let Some(full) = &setpoint.full_scale {
             if register.unit != UnitName::Percent {
@@ -86,5 +96,23 @@ impl Check<'_> {
             );
         }
         self.is_volatile("the setpoint", &setpoint.register, register);
+    }
+
+    /// A register with which a setpoint is compared, or by which it is scaled, counts in a unit that can be.
+    fn counts_in(&mut self, name: Option<&Spanned<String>>, key: &str, unit: UnitName) {
+        let Some(name) = name.filter(|name| name.get_ref() != "owner") else { return };
+        let Some(register) = self.file.named(name.get_ref()) else { return };
+        if register.unit != unit || register.scale.is_none() {
+            let counts = match register.unit.symbol() {
+                "" => "no unit",
+                symbol => symbol,
+            };
+            let setpoint = if key == "high_in" { "the setpoint" } else { "100 % of the setpoint" };
+            self.refuse(
+                &name.span(),
+                format!("{} counts in {counts}, and {setpoint} in {}", name.get_ref(), unit.symbol()),
+                format!("{key} = a register in {} with its scale, or \"owner\"", unit.symbol()),
+            );
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! States: none that covers another, none that hides a trip, and none that nobody can leave.
 
 use super::Check;
-use crate::format::{Access, Bits, Deed, Register, Space, Spanned, StateIs, StateName};
+use crate::format::{Access, Answer, Bits, Deed, Register, Space, Spanned, StateIs, StateName};
+use crate::ladder::word;
 
 /// Whether a word can fit both.
 fn overlap(one: &StateIs, other: &StateIs) -> bool {
@@ -45,17 +46,19 @@ impl Check<'_> {
                     self.refuse(
                         &spanned.span(),
                         format!(
-                            "this state is never seen: {:?} before it takes all of its words",
-                            before.state
+                            "this state is never seen: \"{}\" before it takes all of its words",
+                            word(before.state)
                         ),
                         "masks that tell them apart, the narrower one first",
                     );
                 } else if is_fault(state.state) && !is_fault(before.state) && overlap(before, state) {
                     self.refuse(
                         &spanned.span(),
-                        format!("a trip may be told as {:?}, which stands before it", before.state),
+                        format!("a trip may be told as \"{}\", which stands before it", word(before.state)),
                         "the fault first",
                     );
+                    // Once is enough, whatever else stands before it.
+                    break;
                 }
             }
         }
@@ -90,8 +93,50 @@ impl Check<'_> {
         self.is_volatile("the ladder", name, register);
     }
 
+    /// Each state that needs its ladder has a rung, or a start that leads out of it by itself.
+    fn leads_out(&mut self) {
+        let start = &self.file.start;
+        let disabled = || {
+            let states = self.file.state.is.iter();
+            states.filter(|is| is.get_ref().state == StateName::Disabled)
+        };
+        let starts = [&start.forward, &start.reverse].into_iter().filter_map(Answer::given);
+        // Whatever stands before the run command leads there.
+        let bare = starts.into_iter().find(|start| start.get_ref().steps.len() == 1);
+        match &start.ladder {
+            Answer::None => {
+                let (Some(bare), Some(_)) = (bare, disabled().next()) else { return };
+                let at = self.line_of("ladder").unwrap_or_else(|| bare.span());
+                self.refuse(
+                    &at,
+                    "a state that nobody can leave: [state] has one that is \"disabled\", which needs its ladder first, and there is none",
+                    "ladder = [...] with a rung for each state that is no \"ready\", or state = \"not_ready\" where no word leads out of it",
+                );
+            }
+            Answer::Given(rungs) => {
+                let fits = |state: &StateIs, rung: &Spanned<crate::format::Rung>| {
+                    let (state, rung) = (state.bits.get_ref(), &rung.get_ref().bits);
+                    let mask = state.mask.get_ref() & rung.mask.get_ref();
+                    state.register.get_ref() == rung.register.get_ref()
+                        && (state.differs || rung.differs || (state.value ^ rung.value) & mask == 0)
+                };
+                let none = |state: &&Spanned<StateIs>| !rungs.iter().any(|rung| fits(state.get_ref(), rung));
+                let lost: Vec<_> = disabled().filter(none).map(Spanned::span).collect();
+                for span in lost {
+                    self.refuse(
+                        &span,
+                        "a state that nobody can leave: no rung is for it",
+                        "a rung of the ladder with these bits, and do = \"write\" with what leads out of it, or do = \"wait\"",
+                    );
+                }
+            }
+            Answer::Unknown => {}
+        }
+    }
+
     /// From each rung something leads on, and one leads to the run command.
     fn ladder(&mut self) {
+        self.leads_out();
         let Some(rungs) = self.file.start.ladder.given() else { return };
         for spanned in rungs {
             let rung = spanned.get_ref();

@@ -13,6 +13,9 @@ impl Check<'_> {
                 self.guard(guard);
             }
         }
+        for fingerprint in file.who.fingerprints.given().into_iter().flatten() {
+            self.fingerprint(fingerprint);
+        }
         let set_up = file.who.guards.given().into_iter().flatten().find(|guard| guard.get_ref().set_up);
         if let (Some(guard), None) = (set_up, file.setup.given()) {
             self.refuse(
@@ -34,6 +37,9 @@ impl Check<'_> {
             if let Some(name) = seen.given() {
                 self.readable(name);
             }
+        }
+        for seen in [&see.output, &see.speed] {
+            self.is_no_echo(seen);
         }
         for bits in [&see.at_setpoint, &see.warning, &file.state.standstill] {
             if let Answer::Given(bits) = bits {

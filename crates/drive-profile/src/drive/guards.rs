@@ -14,6 +14,9 @@ pub(super) struct Guarded {
     pub(super) have_held: bool,
     /// What was found otherwise at the last reading.
     pub(super) otherwise: Option<&'static str>,
+    /// Which setting has to be made at the drive, where a guard was found otherwise and every fingerprint as it has to be: it is the
+    /// drive of its profile then, set up for something else.
+    setting: Option<&'static str>,
     /// A run command of this side went out where they held: it may stand in the drive, whatever is read there since.
     pub(super) started: bool,
 }
@@ -22,7 +25,7 @@ impl Guarded {
     /// A drive without guards has nothing to show.
     pub(super) fn of(profile: &Profile) -> Self {
         let none = all(profile).next().is_none();
-        Self { hold: none, have_held: none, otherwise: None, started: false }
+        Self { hold: none, have_held: none, otherwise: None, setting: None, started: false }
     }
 
     /// The line was lost: the drive may be another one.
@@ -35,6 +38,19 @@ fn all(profile: &Profile) -> impl Iterator<Item = &Guard> {
     let who = &profile.file().who;
     let lists = [&who.fingerprints, &who.guards].into_iter().filter_map(|list| list.given());
     lists.flatten().map(crate::format::Spanned::get_ref)
+}
+
+/// What has to be set at the drive, with what was read.
+fn is_to_be_set(guard: &Guard, read: u16) -> String {
+    let name = guard.register.get_ref();
+    let words = |all: &[u16]| all.iter().map(u16::to_string).collect::<Vec<_>>().join(" or ");
+    let mask = guard.mask.unwrap_or(u16::MAX);
+    let of = if mask == u16::MAX { name.clone() } else { format!("{name} & {mask:04X}h") };
+    let to = match (&guard.is, &guard.is_not) {
+        (Some(is), _) => format!("to {}", words(is)),
+        (None, is_not) => format!("to something else than {}", words(is_not.as_deref().unwrap_or_default())),
+    };
+    format!("this does not hold: {} ({of} reads {}): set {of} {to} at the drive", guard.what, read & mask)
 }
 
 fn holds(guard: &Guard, word: u16) -> bool {
@@ -105,6 +121,13 @@ impl<P: Port> ProfileDrive<P> {
         let fails = |guard: &&Guard| read(guard).is_none_or(|word| !holds(guard, word));
         self.guarded.otherwise =
             all(&profile).find(fails).map(|guard| interned::text(&is_otherwise(guard, read(guard))));
+        let guards = profile.file().who.guards.given().into_iter().flatten();
+        let failing = all(&profile).filter(|guard| fails(&guard)).count();
+        let mut unset = guards.map(crate::format::Spanned::get_ref).filter(fails);
+        // A fingerprint that fails is no setting that anybody can make.
+        self.guarded.setting = (unset.clone().count() == failing)
+            .then(|| unset.find_map(|guard| Some(interned::text(&is_to_be_set(guard, read(guard)?)))))
+            .flatten();
         if self.guarded.otherwise.is_none() {
             (self.guarded.hold, self.guarded.have_held) = (true, true);
         }
@@ -115,9 +138,14 @@ impl<P: Port> ProfileDrive<P> {
     pub(super) async fn guard(&mut self, command: Command) -> Result<()> {
         self.see_guards(Class::Command).await?;
         match self.guarded.otherwise {
-            Some(what) => Err(self.refused(command, Refusal::AnotherDrive(what))),
+            Some(what) => Err(self.refused(command, self.why_not(what))),
             None => Ok(()),
         }
+    }
+
+    /// Why nothing is written to a drive of which this was found.
+    fn why_not(&self, otherwise: &'static str) -> Refusal {
+        self.guarded.setting.map_or(Refusal::AnotherDrive(otherwise), Refusal::Settings)
     }
 
     /// What was found otherwise, of a drive that no run command of this side ever went to: it is another one. Once one did, it may stand
@@ -129,6 +157,6 @@ impl<P: Port> ProfileDrive<P> {
 
     /// A stop does not go to a drive that was found to be another one: its stop word may be that one's run word. Nothing was sent.
     pub(super) fn stop_is_barred(&self, command: Command) -> Option<Error> {
-        self.is_another().map(|what| self.refused(command, Refusal::AnotherDrive(what)))
+        self.is_another().map(|what| self.refused(command, self.why_not(what)))
     }
 }

@@ -58,7 +58,7 @@ impl Profile {
             read_words: link.read_words.given().copied().unwrap_or(1),
             rows: interned::list(&self.rows()),
             write_words: link.write_words.given().copied().unwrap_or(1),
-            highest_address: link.highest_address.given().copied().unwrap_or(247),
+            highest_address: link.highest_address.given().map_or(247, |of| *of.get_ref()),
             speeds: speeds.map_or(USUAL, |speeds| interned::list(speeds)),
             formats: if formats.is_empty() {
                 &[CharacterFormat::F8E1, CharacterFormat::F8O1, CharacterFormat::F8N1, CharacterFormat::F8N2]

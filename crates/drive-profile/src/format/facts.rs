@@ -36,6 +36,36 @@ pub struct Tried {
     pub day: String,
     /// What was seen.
     pub seen: String,
+    /// How far it came. Without this and the next two it is told, and lifts nothing.
+    pub reached: Option<Reached>,
+    /// What it was tried on.
+    pub on: Option<TriedOn>,
+    /// The digest of what was tried: what the file said of the drive then. Once it says something else, the trial proves nothing of it.
+    pub of: Option<String>,
+}
+
+/// How far a trial came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Reached {
+    /// All was read; a stop, where one was sent, found the motor at rest.
+    Read,
+    /// A stop over the bus stopped a turning motor.
+    Stopped,
+    /// A start over the bus turned the motor, and a stop stopped it.
+    Started,
+}
+
+/// What was tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum TriedOn {
+    /// A drive with its motor.
+    Drive,
+    /// A program that behaves like one: it proves nothing of a drive.
+    Simulator,
 }
 
 /// Bits of a register that say something.

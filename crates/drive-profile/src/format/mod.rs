@@ -18,8 +18,8 @@ use serde::Deserialize;
 pub use action::{Action, Acts, Command, Deed, ModeName, Rung, Sign, Start, Step, Stops};
 pub use answer::Answer;
 pub use facts::{
-    Bits, Codes, Direction, Faults, FedBy, Forbidden, Guard, Limits, Owner, Proves, Setpoint, Source, Tried,
-    Watchdog,
+    Bits, Codes, Direction, Faults, FedBy, Forbidden, Guard, Limits, Owner, Proves, Reached, Setpoint,
+    Source, Tried, TriedOn, Watchdog,
 };
 pub use register::{Access, Byte, Order, Register, Storage, UnitName};
 pub use spanned::Spanned;
@@ -158,7 +158,7 @@ pub struct Link {
     /// Its factory setting, such as `19200 8E1`.
     pub factory: Answer<Spanned<String>>,
     /// The highest address it can have.
-    pub highest_address: Answer<u8>,
+    pub highest_address: Answer<Spanned<u8>>,
     /// The functions of Modbus that it answers.
     pub functions: Vec<Spanned<u8>>,
     /// Words that one read may ask for; `unknown` counts as one.

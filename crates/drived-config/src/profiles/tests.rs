@@ -37,36 +37,67 @@ fn the_profiles_of_a_folder_and_of_those_in_it_are_families_by_their_keys() {
     assert!(read.has(Family::ATV312), "what is built in is from no folder");
 }
 
+/// The drive that has to be stopped may be another one than that whose file somebody is writing.
 #[test]
-fn a_name_that_is_shipped_or_built_in_or_given_twice_is_refused_with_the_file() {
-    for (key, reason) in [("v20", "is the name of a family"), ("atv312", "is the name of a family")] {
-        let (_kept, profiles) = folder(key);
-        fs::write(profiles.join("own.toml"), text(key)).unwrap();
-        let error = Folder::read(&profiles).unwrap_err().to_string();
-        assert!(error.contains(reason) && error.contains("own.toml"), "{error}");
+fn a_file_that_is_no_profile_is_left_out_alone_and_whoever_names_its_drive_is_told_why() {
+    let (_kept, profiles) = folder("damaged");
+    let damaged = text("folder-damaged").replace("words = [0x047A] }]", "words = [0x047F] }]");
+    fs::write(profiles.join("own-file.toml"), damaged).unwrap();
+    fs::write(profiles.join("long.toml"), "x".repeat(LONGEST + 1)).unwrap();
+    fs::write(profiles.join("good.toml"), text("folder-good")).unwrap();
+    let read = Folder::read(&profiles).unwrap();
+    assert_eq!(read.keys().collect::<Vec<_>>(), ["folder-good"]);
+    assert!(read.has(family("folder-good")) && read.why_not(family("folder-good")).is_none());
+    assert_eq!(read.left_out().len(), 2, "{:?}", read.left_out());
+    for key in ["folder-damaged", "FOLDER-Damaged"] {
+        let error = key.parse::<Family>().unwrap_err().to_string();
+        assert!(
+            error.contains("own-file.toml:") && error.contains("holds a run bit") && error.contains("write"),
+            "{error}"
+        );
     }
-    let (_kept, profiles) = folder("twice");
-    fs::write(profiles.join("one.toml"), text("folder-twice")).unwrap();
-    fs::write(profiles.join("two.toml"), text("folder-twice")).unwrap();
-    let error = Folder::read(&profiles).unwrap_err().to_string();
-    assert!(error.contains("one.toml") && error.contains("two.toml"), "{error}");
-    assert!("folder-twice".parse::<Family>().is_err(), "nothing became known");
+    let error = "long".parse::<Family>().unwrap_err().to_string();
+    assert!(error.contains("long.toml") && error.contains("longer than"), "{error}");
+    // Mended, it is as any other.
+    fs::write(profiles.join("own-file.toml"), text("folder-damaged")).unwrap();
+    assert!(Folder::read(&profiles).unwrap().has(family("folder-damaged")));
+    let error = Folder::read(&profiles.join("nowhere")).unwrap_err().to_string();
+    assert!(error.contains("nowhere"), "{error}");
+}
+
+/// A family that was read before is driven no further by a file that is damaged since.
+#[test]
+fn a_file_that_was_right_and_is_damaged_is_left_out_by_its_name() {
+    let (_kept, profiles) = folder("spoilt");
+    let file = profiles.join("own.toml");
+    fs::write(&file, text("folder-spoilt")).unwrap();
+    assert!(Folder::read(&profiles).unwrap().has(family("folder-spoilt")));
+    fs::write(&file, text("folder-spoilt").replace("acts = \"level\"", "acts = level")).unwrap();
+    let read = Folder::read(&profiles).unwrap();
+    let why = read.why_not(family("folder-spoilt")).expect("its file is damaged");
+    assert!(!read.has(family("folder-spoilt")) && why.contains("own.toml:"), "{why}");
 }
 
 #[test]
-fn a_file_that_is_no_profile_is_refused_with_its_line_and_what_to_write() {
-    let (_kept, profiles) = folder("damaged");
-    let damaged = text("folder-damaged").replace("words = [0x047A] }]", "words = [0x047F] }]");
-    fs::write(profiles.join("damaged.toml"), damaged).unwrap();
-    let error = Folder::read(&profiles).unwrap_err().to_string();
-    assert!(
-        error.contains("damaged.toml:") && error.contains("holds a run bit") && error.contains("write"),
-        "{error}"
-    );
-    fs::write(profiles.join("damaged.toml"), "x".repeat(LONGEST + 1)).unwrap();
-    assert!(Folder::read(&profiles).is_err());
-    let error = Folder::read(&profiles.join("nowhere")).unwrap_err().to_string();
-    assert!(error.contains("nowhere"), "{error}");
+fn a_name_that_is_shipped_or_built_in_or_given_twice_is_left_out_with_the_file() {
+    for (key, reason) in [("v20", "is the name of a family"), ("atv312", "is the name of a family")] {
+        let (_kept, profiles) = folder(key);
+        fs::write(profiles.join("own.toml"), text(key)).unwrap();
+        fs::write(profiles.join("good.toml"), text(&format!("folder-beside-{key}"))).unwrap();
+        let read = Folder::read(&profiles).unwrap();
+        // It is not the drive that the file was to say, although there is one by this name.
+        let error = read.why_not(family(key)).expect("the file is left out");
+        assert!(error.contains(reason) && error.contains("own.toml"), "{error}");
+        assert_eq!(read.keys().count(), 1);
+    }
+    let (_kept, profiles) = folder("twice");
+    fs::write(profiles.join("one.toml"), text("folder-twice")).unwrap();
+    fs::write(profiles.join("three.toml"), text("folder-once")).unwrap();
+    fs::write(profiles.join("two.toml"), text("folder-twice")).unwrap();
+    let read = Folder::read(&profiles).unwrap();
+    assert_eq!(read.keys().collect::<Vec<_>>(), ["folder-once"], "neither of the two is taken");
+    let error = "folder-twice".parse::<Family>().unwrap_err().to_string();
+    assert!(error.contains("one.toml") && error.contains("two.toml"), "{error}");
 }
 
 #[test]

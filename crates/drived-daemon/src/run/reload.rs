@@ -271,6 +271,9 @@ impl Reloader {
     async fn take(&self, config: &mut Config, read: Result<Config, Failure>) -> Result<Vec<String>, Failure> {
         let reloaded = match read {
             Ok(new) => {
+                for why in &new.left_out {
+                    tracing::warn!("a profile is left out: {why}");
+                }
                 self.0.notify.reloading();
                 let done = self.carry_out(config, new).await;
                 self.0.notify.reloaded();

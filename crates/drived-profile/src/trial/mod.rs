@@ -14,7 +14,11 @@ use std::{
 use drive_bus::Endpoint;
 use drive_core::{Frequency, SlaveAddress};
 use drive_families::Family;
-use drive_profile::{Level, Profile, definition, shipped};
+use drive_profile::{
+    Profile, definition,
+    format::{Reached, TriedOn},
+    shipped,
+};
 
 use drived_client::own_line::{close, open_line_of};
 use drived_config::profiles::ProfilesError;
@@ -93,6 +97,9 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         firmware: firmware.clone(),
         day: chrono::Local::now().format("%Y-%m-%d").to_string(),
         seen: Vec::new(),
+        // What is to be tried; what came of it is noted behind it.
+        reached: Reached::Started,
+        on: TriedOn::Drive,
     };
     // By what it is, and by what it is once it was tried: only the last step needs more.
     let (_, tried) = protocol.written_into(&text).map_err(Failure::Input)?;
@@ -102,19 +109,28 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
     protocol.seen.extend(behind_a_pseudo_terminal(&config.endpoint));
     let opened = open_line_of(Some(name), config.clone()).await?;
     let mut console = Console::of_terminal();
+    protocol.on = match said_on(&mut console).await {
+        Ok(on) => on,
+        Err(failure) => {
+            close(&opened).await;
+            return Err(failure);
+        }
+    };
     let steps = Steps { name, line: opened.clone(), config, options, lowest: args.lowest };
     let climbed = steps.climb(&mut console, &mut protocol.seen).await;
     close(&opened).await;
-    let is_started = climbed?;
+    protocol.reached = climbed?;
     let (with, profile) = protocol.written_into(&text).map_err(Failure::Input)?;
-    let before = drive_profile::read(&text).map_or(profile.level(), |profile| profile.level());
-    if profile.level() == Level::Motion && before < Level::Motion && !is_started {
-        return Err(Failure::Drive(format!(
-            "{}: it stays at {before}, and nothing is signed: what lifts it to motion is a trial in which its motor was started and stopped",
-            profile.key()
-        )));
-    }
     output::say(format_args!("{}: it reaches {} now", profile.key(), profile.level()))?;
+    if protocol.on == TriedOn::Simulator {
+        output::say(
+            "it was tried on a simulator: that stands in the protocol, and lifts nothing for a drive",
+        )?;
+    } else if protocol.reached != Reached::Started {
+        output::say(
+            "the trial ended before the start: that stands in the protocol, and lifts nothing to motion",
+        )?;
+    }
     match file {
         Some(file) => {
             fs::write(&file, with).map_err(|error| Failure::Input(format!("{}: {error}", file.display())))?;
@@ -122,7 +138,20 @@ pub(crate) async fn run(args: Args) -> Result<(), Failure> {
         }
         None => {
             output::say("the profile is shipped: put this into a copy of its file, under a key of its own")?;
-            output::say_as_it_is(protocol.table().trim_end())
+            output::say_as_it_is(protocol.table(profile.substance()).trim_end())
+        }
+    }
+}
+
+/// What the line leads to: no request shows it, for a simulator answers like a drive. So the person says it, and signs it.
+async fn said_on(console: &mut Console) -> Result<TriedOn, Failure> {
+    let question = "What is on this line: a drive with its motor, or a simulated one (drived sim, or another program)? A trial on a \
+                    simulator proves nothing of a drive. Type drive or simulator";
+    loop {
+        match console.ask(question).await?.to_ascii_lowercase().as_str() {
+            "drive" => return Ok(TriedOn::Drive),
+            "simulator" => return Ok(TriedOn::Simulator),
+            _ => {}
         }
     }
 }

@@ -6,6 +6,7 @@ use drive_bus::{Line, LineConfig};
 use drive_core::{Direction, Drive, Frequency, Motion, Status, StopMode};
 use drive_families::Options;
 use drive_fleet::{Order, Until};
+use drive_profile::format::Reached;
 use tokio::time::{Instant, sleep};
 
 use drived_client::own_line::{open_drive, wait_at_most, words};
@@ -36,25 +37,33 @@ pub(super) struct Steps {
 }
 
 impl Steps {
-    /// Climbs as far as the profile lets, and notes what was seen. Whether the motor was started and stopped by it.
+    /// Climbs as far as the profile lets, and notes what was seen. How far it came.
     ///
     /// # Errors
     /// A step was not right, or the drive does not answer: nothing further is done.
-    pub(super) async fn climb(&self, console: &mut Console, seen: &mut Vec<String>) -> Result<bool, Failure> {
+    pub(super) async fn climb(
+        &self,
+        console: &mut Console,
+        seen: &mut Vec<String>,
+    ) -> Result<Reached, Failure> {
         seen.push(self.read_all(console).await?);
         seen.push(self.watch_a_start(console).await?);
         let stops = !self.name.family.capabilities().stop_modes.is_empty();
         if !stops {
             console.say("the profile knows no stop: the trial ends here, with what was read")?;
-            return Ok(false);
+            return Ok(Reached::Read);
         }
         // What listens to Ctrl-C while the drive is commanded ends its being the end of the program: so each question hears it from here.
         console.hear(Ending::listen_on_terminal()?);
-        seen.push(self.test_the_stop(console).await?);
-        let started = self.start_slowly(console).await?;
-        let is_started = started.is_some();
-        seen.extend(started);
-        Ok(is_started)
+        let (stopped, reached) = self.test_the_stop(console).await?;
+        seen.push(stopped);
+        match self.start_slowly(console).await? {
+            Some(started) => {
+                seen.push(started);
+                Ok(Reached::Started)
+            }
+            None => Ok(reached),
+        }
     }
 
     /// 1. Everything that can be read, for a person who compares it with the panel.
@@ -109,7 +118,7 @@ impl Steps {
     }
 
     /// 3. The stop, on a motor that somebody else has started.
-    async fn test_the_stop(&self, console: &mut Console) -> Result<String, Failure> {
+    async fn test_the_stop(&self, console: &mut Console) -> Result<(String, Reached), Failure> {
         console.say("")?;
         console
             .ask(
@@ -125,8 +134,8 @@ impl Steps {
         console.say(format_args!("the stop is confirmed ({modes}): the drive shows {status}"))?;
         self.agreed(console, "Does the motor stand?").await?;
         Ok(match turned {
-            true => "a stop over the bus stopped a turning motor".to_owned(),
-            false => "a stop over the bus was taken by a drive at rest".to_owned(),
+            true => ("a stop over the bus stopped a turning motor".to_owned(), Reached::Stopped),
+            false => ("a stop over the bus was taken by a drive at rest".to_owned(), Reached::Read),
         })
     }
 

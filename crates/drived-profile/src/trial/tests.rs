@@ -63,9 +63,10 @@ async fn a_person_climbs_with_the_drive_and_what_was_seen_is_noted() {
     let (answers, asked) = duplex(4_096);
     let person = tokio::spawn(person(answers, machine.clone(), "v20"));
     let mut seen = Vec::new();
-    let climbed = steps.climb(&mut Console::reading(BufReader::new(asked)), &mut seen).await;
+    let reached = steps.climb(&mut Console::reading(BufReader::new(asked)), &mut seen).await;
+    assert_eq!(reached.expect("it climbs"), Reached::Started);
     drop(person.await);
-    assert!(climbed.expect("it climbs") && seen.len() == 4, "{seen:#?}");
+    assert_eq!(seen.len(), 4, "{seen:#?}");
     assert!(seen[3].contains("5.00 Hz"), "{seen:#?}");
     assert!(!machine.observe().running);
 }
@@ -106,9 +107,10 @@ async fn the_motor_is_started_only_by_the_drives_name() {
         let person =
             tokio::spawn(person(answers, machine.clone(), if answer == "V20 " { "v21" } else { answer }));
         let mut seen = Vec::new();
-        let climbed = steps.climb(&mut Console::reading(BufReader::new(asked)), &mut seen).await;
+        let reached = steps.climb(&mut Console::reading(BufReader::new(asked)), &mut seen).await;
+        assert_eq!(reached.expect("it ends there"), Reached::Read, "its stop found the motor at rest");
         drop(person.await);
-        assert!(!climbed.expect("it ends there") && seen.len() == 3, "{seen:#?}");
+        assert_eq!(seen.len(), 3, "{seen:#?}");
         // 047Fh, bit 0 with the bits that let it run: the word that runs a V20.
         let runs = machine.received().iter().any(|request| request.pdu.ends_with(&[0x04, 0x7F]));
         assert!(!runs && !machine.observe().running);
