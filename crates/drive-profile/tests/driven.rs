@@ -529,7 +529,8 @@ async fn an_exception_to_a_run_command_is_no_proof_that_nothing_was_done() {
 
 /// A Goodrive's file with a guard on its fault, which reads otherwise once it has tripped.
 fn with_guard() -> String {
-    let guard = "guards = [{ what = \"it has not tripped\", register = \"FAULT\", is = [0], source = \"manuals\" }]";
+    let guard =
+        "guards = [{ what = \"it has not tripped\", register = \"FAULT\", is = [0], source = \"manuals\" }]";
     text("invt/goodrive").replace("guards = \"none\"", guard)
 }
 

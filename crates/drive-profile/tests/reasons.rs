@@ -5,12 +5,15 @@ use std::fmt::Write as _;
 use drive_profile::{read, shipped};
 
 /// The sources of the checker.
-const CHECKER: [&str; 6] = [
+const CHECKER: [&str; 9] = [
     include_str!("../src/check/mod.rs"),
     include_str!("../src/check/who.rs"),
+    include_str!("../src/check/fingerprints.rs"),
     include_str!("../src/check/registers.rs"),
     include_str!("../src/check/states.rs"),
     include_str!("../src/check/actions.rs"),
+    include_str!("../src/check/standing.rs"),
+    include_str!("../src/check/seen.rs"),
     include_str!("../src/check/setpoint.rs"),
 ];
 
@@ -31,7 +34,12 @@ const SEEN: &[(&str, &str, &str, &str)] = &[
         "factory = \"fast 8E1\"\nhighest",
         "this is no setting of a line",
     ),
-    ("v20", "highest_address = \"unknown\"", "highest_address = 248", "this is no slave address"),
+    (
+        "v20",
+        "highest_address = \"unknown\"",
+        "highest_address = 248",
+        "are no addresses of Modbus over a serial line",
+    ),
     ("v20", "maker = \"Siemens\"", "maker = \" \"", "this is no name that a person can read"),
     ("v20", "page = \"111-115\"", "page = \"\"", "source \"oi2012\" names no document or no page"),
     (
@@ -91,7 +99,7 @@ const SEEN: &[(&str, &str, &str, &str)] = &[
         "v20",
         "register = \"HSW\"\nfull_scale",
         "register = \"STW\"\nfull_scale",
-        "STW is no speed of one word",
+        "is no setpoint: that is one whole word in Hz, rpm or %",
     ),
     (
         "spaces",
@@ -267,8 +275,21 @@ fn reasons() -> Vec<Reason> {
         for call in joined.split("self.refuse(").skip(1) {
             let call = call.split(");\n").next().unwrap_or_default();
             let texts = quoted(call);
-            let [said, write] = &texts[..2] else { panic!("a reason, and what to write: {call}") };
-            all.push(Reason { said: Reason::open(said), write: Reason::open(write) });
+            match &texts[..] {
+                [said, write, ..] => {
+                    all.push(Reason { said: Reason::open(said), write: Reason::open(write) });
+                }
+                // Several reasons for which the same is to be written.
+                _ => {
+                    let first = |text: &str| quoted(text).into_iter().next().expect("a text");
+                    let (_, instead) = joined.split_once("const INSTEAD").expect("what to write instead");
+                    let write = first(instead);
+                    all.extend(joined.split("format!(").skip(1).map(|reason| Reason {
+                        said: Reason::open(&first(reason)),
+                        write: Reason::open(&write),
+                    }));
+                }
+            }
         }
     }
     all.dedup_by(|one, other| one.said == other.said);
@@ -277,7 +298,12 @@ fn reasons() -> Vec<Reason> {
 
 #[test]
 fn each_reason_of_the_checker_stands_in_the_list_and_was_seen_by_a_test() {
-    let tests = [include_str!("refused.rs"), include_str!("published.rs"), include_str!("reasons.rs")];
+    let tests = [
+        include_str!("refused.rs"),
+        include_str!("slips.rs"),
+        include_str!("published.rs"),
+        include_str!("reasons.rs"),
+    ];
     let named: Vec<String> = tests.into_iter().flat_map(quoted).collect();
     let reasons = reasons();
     assert!(reasons.len() > 80, "only {} reasons were found", reasons.len());

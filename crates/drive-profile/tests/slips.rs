@@ -76,9 +76,19 @@ fn a_stop_by_a_setpoint_of_zero_stops_what_a_setpoint_starts() {
 #[test]
 fn an_output_that_is_what_was_written_shows_nothing() {
     let text = damaged(MMAX, "output = \"FREQUENCY\"", "output = \"SPEED_SETPOINT\"");
-    refused(&text, "output = \"SPEED", "SPEED_SETPOINT is what was written", "the register of the output");
+    refused(
+        &text,
+        "output = \"SPEED",
+        "SPEED_SETPOINT is what was written, and shows nothing of the motor",
+        "the register of the output",
+    );
     let text = damaged(MMAX, "speed = \"SPEED\"", "speed = \"SPEED_SETPOINT\"");
-    refused(&text, "speed = \"SPEED_", "SPEED_SETPOINT is what was written", "the register of the output");
+    refused(
+        &text,
+        "speed = \"SPEED_",
+        "SPEED_SETPOINT is what was written, and shows nothing of the motor",
+        "the register of the output",
+    );
 }
 
 #[test]
@@ -182,7 +192,7 @@ fn a_trial_on_a_day_that_is_none_or_written_by_hand_without_what_was_tried() {
         );
         damaged(POWERFLEX, "tried = \"none\"", &table)
     };
-    refused(&tried("27.11.2026"), "tried = [", "\"27.11.2026\" is no day", "\"2026-11-24\"");
+    refused(&tried("27.11.2026"), "tried = [", "is no day on which it was tried", "\"2026-11-24\"");
     let profile = read(&tried("2026-11-27")).expect("it is right");
     let said = profile.gaps().iter().any(|gap| gap.what.contains("does not say what was tried"));
     assert!(profile.level() == Level::Stop && said, "{:#?}", profile.gaps());
