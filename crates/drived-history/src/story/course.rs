@@ -151,6 +151,10 @@ pub(super) fn not_known(facts: &Facts, moment: i64, is_about: bool) -> Vec<Sente
         let text = "so much happened in the plant that the later part of it was not looked at";
         said.push(Sentence::of(Certainty::NotKnown, text));
     }
+    if facts.to <= facts.from {
+        said.push(Sentence::of(Certainty::NotKnown, "the history does not reach to that moment"));
+        return said;
+    }
     let share = facts.known * 100.0;
     let around = lasting(facts.to - facts.from);
     let text = match is_about {

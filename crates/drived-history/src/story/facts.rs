@@ -30,8 +30,6 @@ pub(super) struct Facts {
     pub(super) is_cut: bool,
     /// How much of the time something is known of the drive, from 0 to 1.
     pub(super) known: f64,
-    /// When it was heard, by its values.
-    spans: Vec<(i64, i64)>,
     /// Times in which nothing is known, longer than a few polls.
     pub(super) gaps: Vec<(i64, i64)>,
     /// What its inputs showed, from each of these moments on,
@@ -44,6 +42,8 @@ pub(super) struct Facts {
     pub(super) heard: Vec<(String, Vec<(i64, i64)>)>,
     /// How many frames of somebody else its line heard, minute by minute: when the minute ended, and how many.
     pub(super) foreigners: Vec<(i64, i64)>,
+    /// That the clock was set forward over the moment, so that there was no such time.
+    pub(super) skipped: Option<RecordView>,
 }
 
 /// So long before a stream that was begun anew something may be missing.
@@ -65,6 +65,8 @@ const SHOWN: [&str; 10] = [
     "reference_taken",
     "command_overridden",
 ];
+/// A clock that was set forward by more than this skipped no time that somebody would ask for.
+const SKIPPED_MS: i64 = 24 * 60 * 60_000;
 /// So many other drives of a line are looked at, whether they were heard.
 const NEIGHBOURS: usize = 64;
 
@@ -75,6 +77,13 @@ impl Facts {
         let (from, to) = ((at - BEFORE_MS).max(first), (at + AFTER_MS).min(last));
         let filter = Filter { from_ms: from, to_ms: to, limit: RECORDS, ..Filter::default() };
         let Found { records, is_cut } = records(connection, &filter)?;
+        let steps = Filter { what: Some("clock_stepped"), ..Filter::default() };
+        let steps = Filter { from_ms: at, to_ms: at.saturating_add(SKIPPED_MS), limit: RECORDS, ..steps };
+        let mut steps = self::records(connection, &steps)?.records.into_iter();
+        let skipped = steps.find(|step| {
+            let (from, to) = (body(step).from_unix_ms, body(step).to_unix_ms);
+            from.zip(to).is_some_and(|(from, to)| (from..to).contains(&at))
+        });
         let of_drive = |found: &&RecordView| found.drive.as_deref() == Some(drive);
         let line = records.iter().filter(of_drive).find_map(|found| found.line.clone());
         let spans = heard(connection, drive, from, to)?;
@@ -105,13 +114,13 @@ impl Facts {
             records,
             is_cut,
             known,
-            spans,
             gaps,
             inputs,
             inputs_known,
             controls,
             heard: Vec::new(),
             foreigners,
+            skipped,
         };
         let neighbours: Vec<String> =
             facts.neighbours().into_iter().take(NEIGHBOURS).map(str::to_owned).collect();
@@ -130,11 +139,6 @@ impl Facts {
     /// The last time in which nothing was known of the drive, of those that ended no longer than a moment before it was seen again.
     pub(super) fn gap_before(&self, at: i64) -> Option<(i64, i64)> {
         self.gaps.iter().rev().copied().find(|(start, end)| *start < at && at <= *end + SEEN_AGAIN_MS)
-    }
-
-    /// Whether it was heard all the time between two moments.
-    pub(super) fn is_heard(&self, from: i64, to: i64) -> bool {
-        self.spans.iter().any(|(start, end)| *start <= from && to <= *end)
     }
 
     /// Drives of its line that were heard all the time between two moments.
@@ -169,6 +173,7 @@ impl Facts {
                     (body.since_unix_ms.unwrap_or(i64::MIN), "records could not be kept")
                 }
                 "damaged" => (i64::MIN, "what was kept before was damaged"),
+                "stood_still" => (body.since_unix_ms.unwrap_or(at), "this program stood still"),
                 "stream_anew" => (at - TOLD_AGAIN_MS, "what was told may have been missed"),
                 _ => continue,
             };

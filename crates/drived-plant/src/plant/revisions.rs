@@ -5,7 +5,10 @@
 
 use std::{
     collections::VecDeque,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 
 use bytes::Bytes;
@@ -50,6 +53,8 @@ impl Subject {
 pub struct Revisions {
     ring: Mutex<Ring>,
     last: watch::Sender<u64>,
+    /// How far the history has kept them.
+    kept: AtomicU64,
 }
 
 struct Ring {
@@ -76,7 +81,7 @@ impl Revisions {
     pub(crate) fn new() -> Self {
         let last = unix(Instant::now());
         let ring = Ring { last, frames: VecDeque::new(), bytes: 0 };
-        Self { ring: Mutex::new(ring), last: watch::Sender::new(last) }
+        Self { ring: Mutex::new(ring), last: watch::Sender::new(last), kept: AtomicU64::new(last) }
     }
 
     /// The number of the newest.
@@ -122,6 +127,17 @@ impl Revisions {
         let last = self.last.subscribe();
         let since = since.unwrap_or(*last.borrow());
         Reader { since, last }
+    }
+
+    /// A reader of what no history has kept yet: a drive may have told something before the history was open, and between two of
+    /// them.
+    pub fn reader_of_the_rest(&self) -> Reader {
+        self.reader(Some(self.kept.load(Ordering::Relaxed)))
+    }
+
+    /// The history has kept what this reader has read.
+    pub fn note_kept(&self, reader: &Reader) {
+        self.kept.store(reader.since, Ordering::Relaxed);
     }
 
     /// What is new for a reader, when there is something.

@@ -10,7 +10,7 @@ use super::{
         body::body,
         facts::{Facts, begins, lasting},
     },
-    evidence::lost_before,
+    evidence::{lost_before, silence_before},
 };
 
 /// Drives that fell silent within this time of each other may have done so together: so much the polls and their repetitions lie apart.
@@ -77,9 +77,8 @@ fn command_gone<'a>(facts: &'a Facts, lost: &RecordView) -> Option<&'a RecordVie
         facts.is_of_drive(found)
             && found.number > lost.number
             && matches!(&*found.what, "command_overridden" | "run_not_adopted")
-            && facts
-                .gap_before(found.time_unix_ms)
-                .is_some_and(|(start, _)| (start - begins(lost)).abs() <= SILENT_TOGETHER_MS)
+            && silence_before(facts, found.time_unix_ms)
+                .is_some_and(|(start, ..)| (start - begins(lost)).abs() <= SILENT_TOGETHER_MS)
     })
 }
 

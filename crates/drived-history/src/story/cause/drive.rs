@@ -12,22 +12,25 @@ use super::{
     },
     back::of_supply,
     evidence::{
-        BESIDE_MS, SILENT_MS, asked_before, found_within, inputs_stayed, lost_before, nobody_asked,
-        seen_beside,
+        BESIDE_MS, OBEYED_MS, SILENT_MS, asked_before, found_within, inputs_stayed, lost_before,
+        nobody_asked, seen_beside,
     },
 };
 
-/// No drive is off and on again, and answers, within this time.
-const BOOT_MS: i64 = 1_500;
+/// What was seen of one reading is recorded within this time.
+const ONE_READING_MS: i64 = 1_000;
 
 /// What somebody or something did at the drive itself.
 pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, open: &str) -> Vec<Sentence> {
     let mut all = vec![said];
     all.extend(lost_before(facts, about.time_unix_ms));
     if matches!(&*about.what, "command_overridden" | "run_not_adopted") {
-        all.extend(of_supply(facts, about));
+        let of_reference = of_reference(facts, about);
+        if of_reference.is_empty() {
+            all.extend(of_supply(facts, about));
+        }
+        all.extend(of_reference);
     }
-    all.extend(of_word(facts, about));
     all.extend(seen_beside(facts, about.time_unix_ms));
     if about.what == "output_blocked" {
         all.extend(of_low_speed(facts, about));
@@ -36,13 +39,38 @@ pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, op
     all
 }
 
-/// That its run command went by another word, where the drive's words leave a power cycle open: it was heard all the time.
-fn of_word(facts: &Facts, about: &RecordView) -> Option<Sentence> {
-    let at = about.time_unix_ms;
-    let is_open = about.text.contains("power cycle") && facts.is_heard(at - BOOT_MS, at);
-    is_open.then(|| {
-        let text = "no power cycle, for it was heard all the time: another word was written to it, as another master does";
-        Sentence::of(Likely, text)
+/// Whether its run command went with its supply or by another word, where the drive's words leave that open: its reference tells them
+/// apart. That it was heard tells nothing, for a drive is off and on again between two looks at it.
+fn of_reference(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
+    if !about.text.contains("power cycle") {
+        return Vec::new();
+    }
+    let went = facts.records.iter().find(|found| {
+        found.what == "command_gone"
+            && found.drive == about.drive
+            && (found.time_unix_ms - about.time_unix_ms).abs() <= ONE_READING_MS
+    });
+    let Some(went) = went else { return Vec::new() };
+    let seen = Sentence::of(Seen, went.text.clone()).at(went.time_unix_ms);
+    let shown = body(went);
+    let text = match (shown.reference_before_hz, shown.reference_hz) {
+        (Some(_), Some(0.0)) => {
+            "its supply was away: both are 0 when a drive is fed again, and who only stops it leaves its reference as it was"
+        }
+        (before, now) if before == now => {
+            "its supply was not away, for its reference stayed: another word was written to it, as another master does"
+        }
+        _ => return vec![seen],
+    };
+    vec![seen, Sentence::of(Likely, text).at(about.time_unix_ms)]
+}
+
+/// That its STOP key has stopped its motor, as its status said with what it shows or shortly before.
+fn stop_key(facts: &Facts, at: i64) -> Option<&RecordView> {
+    facts.records.iter().find(|found| {
+        found.what == "stop_key"
+            && found.drive.as_deref() == Some(&*facts.drive)
+            && (at - OBEYED_MS..=at + ONE_READING_MS).contains(&found.time_unix_ms)
     })
 }
 
@@ -122,6 +150,13 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             let (mut said, at) = (Vec::new(), about.time_unix_ms);
             let changed = body(about);
             let begins_to_run = changed.to.as_deref() == Some("running");
+            if let Some(key) = stop_key(facts, at).filter(|_| !begins_to_run) {
+                said.push(
+                    Sentence::of(Said, format!("the drive says so: {}", key.text)).at(key.time_unix_ms),
+                );
+                said.push(Sentence::of(NotKnown, "who pressed it cannot be seen from the line"));
+                return said;
+            }
             let shown = shown_before(facts, about).filter(|_| !begins_to_run);
             if let Some(shown) = shown {
                 let text =

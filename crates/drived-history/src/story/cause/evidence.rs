@@ -7,7 +7,7 @@ use drived_plant::plant::past::{
 
 use super::super::{
     body::body,
-    facts::{Facts, lasting},
+    facts::{Facts, begins, lasting},
 };
 
 /// What comes within this time of each other may have one cause.
@@ -20,6 +20,9 @@ pub(super) const OBEYED_MS: i64 = 10_000;
 pub(super) const SILENT_MS: i64 = 90_000;
 /// The slow set is read so rarely that what it shows belongs to something within this time.
 pub(super) const BESIDE_MS: i64 = 60_000;
+
+/// Events of one status are told within this time of each other.
+const ONE_STATUS_MS: i64 = 100;
 
 /// That nobody here asked for something, where that is known: what begins between two looks at a drive was asked for shortly before.
 pub(super) fn nobody_asked(facts: &Facts, at: i64) -> Sentence {
@@ -93,14 +96,30 @@ pub(super) fn found_within(facts: &Facts, at: i64, what: &str) -> Sentence {
     }
 }
 
+/// From when to when it had not answered until it was seen again, also for so short a time that values are told across it; and its
+/// loss.
+pub(super) fn silence_before(facts: &Facts, at: i64) -> Option<(i64, i64, &RecordView)> {
+    let own = |what: &str, from: i64, to: i64| {
+        let mut own = facts.records.iter().rev();
+        own.find(|found| {
+            found.what == what
+                && found.drive.as_deref() == Some(&*facts.drive)
+                && (from..=to).contains(&found.time_unix_ms)
+        })
+    };
+    match facts.gap_before(at) {
+        Some((start, end)) => Some((start, end, own("lost", start - TOGETHER_MS, end)?)),
+        None => {
+            let back = own("connected", at - ONE_STATUS_MS, at + ONE_STATUS_MS)?;
+            let lost = own("lost", back.time_unix_ms - SILENT_MS, back.time_unix_ms)?;
+            Some((begins(lost), back.time_unix_ms, lost))
+        }
+    }
+}
+
 /// That it had not answered until it was seen again.
 pub(super) fn lost_before(facts: &Facts, at: i64) -> Option<Sentence> {
-    let (start, end) = facts.gap_before(at)?;
-    let lost = facts.records.iter().rev().find(|found| {
-        found.what == "lost"
-            && found.drive.as_deref() == Some(&*facts.drive)
-            && (start - TOGETHER_MS..=end).contains(&found.time_unix_ms)
-    })?;
+    let (start, end, lost) = silence_before(facts, at)?;
     let text = format!("it had not answered before, for {}: {}", lasting(end - start), lost.text);
     Some(Sentence::of(Seen, text).at(lost.time_unix_ms))
 }

@@ -12,7 +12,8 @@
 //! | the time at low speed | likely | the drive names it among others, a setpoint came before, and no input changed |
 //! | its supply | likely | it was silent, and its run command was gone when it was seen again |
 //! | its cable, and not its supply | likely | it was silent, and when it was heard again it ran on by a bus, or its watchdog had acted |
-//! | another word, and no power cycle | likely | it was heard all the time in which its run command went |
+//! | its supply, and no other word | likely | its reference went to 0 with its run command |
+//! | another word, and no power cycle | likely | its run command went, and its reference stayed |
 //! | what a line's drives share | likely | they fell silent together, and nobody of them answered meanwhile |
 //! | what lines share | likely | drives of other lines fell silent with it |
 //! | one cause of several trips | likely | within two seconds, and by the same, or all by the supply |
@@ -78,6 +79,13 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
 
 /// That nothing happened, or that nobody knows.
 pub(super) fn of_nothing(facts: &Facts, at: i64, has_moved: bool) -> Vec<Sentence> {
+    if let Some(step) = &facts.skipped {
+        let text = format!(
+            "there was no such time: {}. What happened is told under the new time, from then on",
+            step.text
+        );
+        return vec![Sentence::of(Seen, text).at(step.time_unix_ms)];
+    }
     let mut said = match facts.gap_at(at) {
         Some((start, end)) => vec![
             Sentence::of(
@@ -109,7 +117,10 @@ fn program(facts: &Facts, at: i64) -> Vec<Sentence> {
         .iter()
         .filter(is_near)
         .filter(|found| {
-            matches!(&*found.what, "began" | "began_after_kill" | "ended" | "hole" | "clock_stepped")
+            matches!(
+                &*found.what,
+                "began" | "began_after_kill" | "ended" | "hole" | "clock_stepped" | "stood_still"
+            )
         })
         .map(|found| Sentence::of(Seen, found.text.clone()).at(found.time_unix_ms))
         .collect()

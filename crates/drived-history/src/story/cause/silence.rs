@@ -1,12 +1,15 @@
 //! Why a drive fell silent, and why it heard nothing.
 
 use drived_plant::plant::past::{
-    Certainty::{Likely, NotKnown, Seen},
+    Certainty::{Likely, NotKnown, Said, Seen},
     RecordView, SentenceView as Sentence,
 };
 
 use super::{
-    super::facts::{Facts, begins},
+    super::{
+        body::body,
+        facts::{Facts, begins},
+    },
     back::{Back, SILENT_TOGETHER_MS, Shows},
     evidence::{SILENT_MS, TOGETHER_MS, names},
 };
@@ -56,6 +59,18 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         return vec![
             Sentence::of(Seen, format!("the port of the line was away: {}", away.text)).at(away.time_unix_ms),
             Sentence::of(NotKnown, "who unplugged it, or what broke, the program cannot see"),
+        ];
+    }
+    // Nobody was asked: that they answered nothing tells nothing of them.
+    if let Some(paused) = stood_still(facts, begins(about), at) {
+        let said = Sentence::of(Seen, paused.text.clone()).at(paused.time_unix_ms);
+        return [said].into_iter().chain(Back::behind(facts, about).told(facts)).collect();
+    }
+    if about.text.contains(": exception ") {
+        let text = "it answered, by exceptions: neither its supply nor its cable was away, and it did not tell its status";
+        return vec![
+            Sentence::of(Said, text),
+            Sentence::of(NotKnown, "whether it is busy, or another drive than it is set up as"),
         ];
     }
     let neighbours = facts.neighbours();
@@ -150,6 +165,15 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             said
         }
     }
+}
+
+/// That this program itself stood still for most of a silence.
+fn stood_still(facts: &Facts, from: i64, to: i64) -> Option<&RecordView> {
+    facts.records.iter().find(|found| {
+        let since = body(found).since_unix_ms.unwrap_or(found.time_unix_ms);
+        let shared = found.time_unix_ms.min(to) - since.max(from);
+        found.what == "stood_still" && shared * 2 >= to - from
+    })
 }
 
 /// An alarm as far as it is looked at here.
