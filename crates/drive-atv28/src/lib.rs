@@ -16,7 +16,7 @@ pub mod words;
 
 use drive_core::{
     Absent, Capabilities, Control, ExceptionMeaning, Port, Quantity, Registers, Row, SerialSettings,
-    SlaveAddress, Speed, StopMode, serial::CharacterFormat,
+    SlaveAddress, Speed, StatusBit, StopMode, serial::CharacterFormat,
 };
 use drive_drivecom::Proof;
 
@@ -43,6 +43,8 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     fault_reset: "CMD bit 7, rising edge",
     // SLF.
     communication_fault: Some(5),
+    // Its manual prints no bits of ETA: those of the Altivar 312, of which it shows the same chart.
+    stop_key: Some(StatusBit { address: 458, mask: 1 << 14, source: "BBV51701 p. 21" }),
     identification: Some("nominal current INV (W555)"),
     broadcast_stops: &[StopMode::Fast, StopMode::Freewheel],
     fault_history: 4,

@@ -19,7 +19,8 @@ mod settings;
 pub mod words;
 
 use drive_core::{
-    Capabilities, Control, ExceptionMeaning, Port, Quantity, Registers, Row, SlaveAddress, StopMode,
+    Capabilities, Control, ExceptionMeaning, Port, Quantity, Registers, Row, SlaveAddress, StatusBit,
+    StopMode,
     registers::{Register, access::WriteStopped},
     serial::CharacterFormat,
 };
@@ -49,6 +50,7 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     watchdog: Some(parameters::WATCHDOG),
     // SLF.
     communication_fault: Some(5),
+    stop_key: Some(StatusBit { address: 3201, mask: 1 << 14, source: "BBV51701 p. 21" }),
     identification: Some("function 43/14, and NCV, VCAL, INV, UdP, TSP"),
     release: true,
     persist: Some("CMI bit 1"),

@@ -461,7 +461,18 @@ pub struct Stats {
     pub worst_case_stop: Duration,
 }
 
+/// How it begins why a port is opened anew that is there, and on which nobody answers.
+pub(crate) const NOTHING_HEARD: &str = "nothing was heard";
+
 impl Stats {
+    /// Why the port is not there; `None`: it is. One that is only opened anew because nobody answers is there: what is seen then is a
+    /// silence, and no port that is away.
+    #[must_use]
+    pub fn port_away(&self) -> Option<&str> {
+        let why = self.away.as_deref().unwrap_or("it is opened");
+        (self.opened <= self.lost && !why.starts_with(NOTHING_HEARD)).then_some(why)
+    }
+
     /// Whether everything that came as an answer came sooner than the configured speed can carry it, so that nothing was taken
     /// for one: three times at least, and nothing else. The far end is faster then than it is said to be, an adapter without a
     /// UART or a program, and [`far_end_paces`](crate::LineConfig::far_end_paces) is to be `Some(false)`; or the speed is set

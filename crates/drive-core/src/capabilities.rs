@@ -8,6 +8,7 @@ use crate::{
     registers::{Restoring, Row, Scaled},
     serial::{CharacterFormat, SerialSettings},
     setpoint::StopMode,
+    status::Status,
     turns::STATUSES_PER_TURN,
 };
 
@@ -64,6 +65,8 @@ pub struct Capabilities {
     /// [`Status::fault_code`](crate::Status::fault_code) and of [`Fault::code`](crate::Fault::code). `None` where its manual
     /// names none.
     pub communication_fault: Option<u16>,
+    /// Where its status says that its STOP key has stopped the motor; `None` where its manual names no such bit.
+    pub stop_key: Option<StatusBit>,
     /// How it says what it is, where it does.
     pub identification: Option<&'static str>,
     /// Whether control can be given back to the panel or the terminals over the bus.
@@ -95,6 +98,25 @@ pub struct Capabilities {
     /// The values that a drive of it can show, whatever a single drive or its configuration holds back: who announces values
     /// before a drive was seen announces these. One that stands here may be missing in a drive; one that does not is never there.
     pub quantities: &'static [Quantity],
+}
+
+/// A bit of a status.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct StatusBit {
+    /// The word that it is in, among [`Status::raw`](crate::Status::raw).
+    pub address: u16,
+    /// The bit, as a mask.
+    pub mask: u16,
+    /// Where the manual says so.
+    pub source: &'static str,
+}
+
+impl StatusBit {
+    /// Whether it is 1 in a status; `None` where that has not its word.
+    #[must_use]
+    pub fn is_set(&self, status: &Status) -> Option<bool> {
+        status.raw(self.address).map(|word| word & self.mask != 0)
+    }
 }
 
 /// A setting by which a drive waits before it answers.
@@ -163,6 +185,7 @@ impl Capabilities {
             fault_reset: "as its manual says",
             watchdog: None,
             communication_fault: None,
+            stop_key: None,
             identification: None,
             release: false,
             persist: None,

@@ -56,7 +56,9 @@ pub use tokio_modbus;
 pub use absent::Absent;
 pub use address::{SlaveAddress, SlaveAddressError};
 pub use calls::{Calls, Lifetimes, Registers};
-pub use capabilities::{AnswerDelay, Capabilities, LineMismatch, Reaction, Watchdog, WatchdogCapability};
+pub use capabilities::{
+    AnswerDelay, Capabilities, LineMismatch, Reaction, StatusBit, Watchdog, WatchdogCapability,
+};
 pub use confirm::{CONFIRMED_WITHIN, Confirming, SETTLED_WITHIN};
 pub use drive::{BroadcastWrite, Drive};
 pub use error::{Error, ErrorKind, ExceptionMeaning, Exchange, Result, SetpointProblem};

@@ -102,6 +102,9 @@ table! {
     /// It does not answer.
     Lost: "lost", "does not answer", Alarm, false,
         "look at its supply, its address and its cable";
+    /// It answers, by exceptions: nothing is known of it, and it is not silent.
+    Refuses: "refuses", "answers, and refuses to tell its status", Alarm, false,
+        "see which drive it is, and whether it is set up as that";
     /// It answers, and what it showed last is old.
     Stale: "stale", "what it shows is old", Warning, false,
         "see how busy its line is";

@@ -1,6 +1,6 @@
 //! What troubles a drive now, read off its snapshot: by the table of [`ConcernKind`] and nowhere else.
 
-use drive_core::{Control, Motion};
+use drive_core::{Control, Error, Motion};
 use tokio::time::Instant;
 
 use crate::{
@@ -76,7 +76,10 @@ impl Snapshot {
                 let turns = status.is_some_and(|status| !status.value.is_undriven());
                 (None, (waits && turns && self.link == Link::Connected).then_some(None)?)
             }
-            ConcernKind::Lost => (heard, (self.link == Link::Lost && !was_moving).then(error)?),
+            ConcernKind::Lost => {
+                (heard, (self.link == Link::Lost && !was_moving && !self.refuses()).then(error)?)
+            }
+            ConcernKind::Refuses => (None, self.refuses().then(error)?),
             ConcernKind::Stale => {
                 let is_old = self.link == Link::Connected && self.freshness(now) == Freshness::Stale;
                 (heard.filter(|_| is_old).map(Some)?, error())
@@ -107,10 +110,17 @@ impl Snapshot {
             }
             ConcernKind::Coasting => (None, shaft(Motion::Coasting).then_some(None)?),
             ConcernKind::Held => (None, shaft(Motion::Held).then_some(None)?),
-            ConcernKind::NeverSeen => (None, (self.link == Link::Connecting).then(error)?),
+            ConcernKind::NeverSeen => (None, (self.link == Link::Connecting && !self.refuses()).then(error)?),
         };
         let noted = || self.since.iter().find(|(noted, _)| *noted == kind).map(|(_, since)| *since);
         Some(Concern { kind, since: since.or_else(noted), detail })
+    }
+
+    /// Whether it answers and refuses, so that nothing is known of it: a drive of another family does so, and one that is busy. It is
+    /// not silent.
+    #[must_use]
+    pub fn refuses(&self) -> bool {
+        self.link != Link::Connected && matches!(self.error, Some(Error::Exception { .. }))
     }
 
     /// Whether something would be seen at `now` if it troubled the drive: only then it troubles nobody any more where it is not seen. A
@@ -118,9 +128,13 @@ impl Snapshot {
     pub(crate) fn would_show(&self, kind: ConcernKind, now: Instant) -> bool {
         let Some(status) = self.fresh_status(now) else {
             // That it answers is seen even where it is not heard often enough.
-            let answers =
-                matches!(kind, ConcernKind::Lost | ConcernKind::LostRunning | ConcernKind::NeverSeen);
-            return answers && self.link == Link::Connected;
+            let is_connected = self.link == Link::Connected;
+            return match kind {
+                ConcernKind::LostRunning => is_connected,
+                ConcernKind::Lost | ConcernKind::NeverSeen => is_connected || self.refuses(),
+                ConcernKind::Refuses => is_connected || self.error.is_some(),
+                _ => false,
+            };
         };
         let is_here = status.control.is_none_or(|control| control == Control::Bus);
         match kind {

@@ -174,8 +174,14 @@ impl Recorder {
             tasks.spawn(forward::run(path.clone(), forward, inbox.clone(), failing));
             tasks.spawn(tell_forwarding(around.plant.clone(), seen));
         }
-        let counted =
-            maintenance::count(path.clone(), config.maintained, around.plant.clone(), inbox.clone(), done);
+        let counted = maintenance::count(
+            path.clone(),
+            config.maintained,
+            around.plant.clone(),
+            inbox.clone(),
+            done,
+            clocks,
+        );
         tasks.spawn(counted);
         let writer =
             Writer { path, limits: config.limits, inbox: inbox.clone(), clock, health: health.clone() };

@@ -3,6 +3,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
+    fmt::Display,
     sync::Arc,
     time::{Duration, SystemTime},
 };
@@ -13,7 +14,7 @@ use drived_plant::plant::{
     revisions::Next,
     views::{CommandView, ExchangeView, NoticeView},
 };
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use tokio::{
     sync::watch,
     task::{AbortHandle, JoinSet},
@@ -22,8 +23,12 @@ use tokio::{
 
 use crate::{
     departure::Departure,
+    errors::Errors,
+    gone::Gone,
     quantity::{Quantity, Set, numbers, of_measurements, of_status},
+    reason::Reasons,
     record::{Kind, LineMinute, Moment, Record},
+    stop_key::StopKey,
     tracker::Tracker,
     write::{
         frames,
@@ -34,9 +39,11 @@ use crate::{
 
 /// Between two looks at who belongs to the fleet.
 const LOOK: Duration = Duration::from_secs(1);
-/// A look that comes so much later than it should is told: the program, or its computer, stood still.
-const STANDSTILL_MS: i64 = 2_000;
 const MINUTE: Duration = Duration::from_secs(60);
+/// Between two looks at whether this program goes on,
+const PULSE: Duration = Duration::from_millis(500);
+/// and what is no delay of a busy machine any more.
+const STOOD_STILL: Duration = Duration::from_secs(2);
 /// What is longer is kept without what the API told: a command for a thousand drives.
 const LONGEST_BODY: usize = 256 << 10;
 /// So many of the last exchanges of its line are kept beside a trip.
@@ -88,6 +95,7 @@ impl Listening {
         tasks.spawn(drives(plant.clone(), inbox.clone(), clocks));
         tasks.spawn(stream(plant.clone(), inbox.clone(), clocks));
         tasks.spawn(lines(plant.clone(), inbox.clone(), clocks));
+        tasks.spawn(pauses(inbox.clone(), clocks));
         tasks.spawn(tell(plant.clone(), health));
         Self(tasks)
     }
@@ -107,12 +115,8 @@ async fn drives(plant: Plant, inbox: Inbox, clocks: Clocks) {
     let mut followed: BTreeMap<Arc<str>, Ending> = BTreeMap::new();
     let mut looks = interval(LOOK);
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut looked = clocks.now();
     loop {
         looks.tick().await;
-        let now = clocks.now();
-        standstill(&inbox, looked, now);
-        looked = now;
         for drive in plant.fleet().drives() {
             if followed.get(drive.name()).is_none_or(|known| known.0.is_finished()) {
                 let name = Arc::clone(drive.name());
@@ -123,37 +127,21 @@ async fn drives(plant: Plant, inbox: Inbox, clocks: Clocks) {
     }
 }
 
-/// Keeps that the program itself did not run between two looks, as when its computer hung: what was not heard then nobody had asked.
-fn standstill(inbox: &Inbox, looked: Moment, now: Moment) {
-    let lasted_ms = now.steady_ms - looked.steady_ms - milliseconds(LOOK);
-    if lasted_ms < STANDSTILL_MS {
-        return;
-    }
-    let text = format!(
-        "this program stood still for {:.1} s: it asked nobody, and heard nobody",
-        lasted_ms as f64 / 1_000.0
-    );
-    let body = Some(format!("{{\"lasted_ms\":{lasted_ms}}}"));
-    inbox.record(Record { body, ..Record::of_history(now, "stood_still", text) });
-}
-
 async fn follow(drive: DriveHandle, inbox: Inbox, clocks: Clocks) {
     let mut watch = drive.watch();
     let mut sets = Set::ALL.map(|set| (set, Tracker::default()));
-    let mut departure = Departure::default();
+    let (mut departure, mut gone, mut stop_key) = (Departure::default(), Gone::default(), StopKey::default());
     let numbers = numbers(drive.capabilities());
     loop {
         let snapshot = Arc::clone(&watch.borrow_and_update());
         if let Some(left) = departure.look(&snapshot) {
-            let record = Record::of_history(clocks.now(), "output_departed", left.to_string());
-            let (name, line) = (drive.name().to_string(), drive.line().0.to_string());
-            inbox.record(Record {
-                kind: Kind::Event,
-                drive: Some(name),
-                line: Some(line),
-                body: serde_json::to_string(&left).ok(),
-                ..record
-            });
+            inbox.record(fact(&drive, clocks.now(), "output_departed", &left));
+        }
+        if let Some(pressed) = stop_key.look(drive.capabilities().stop_key, &snapshot) {
+            inbox.record(fact(&drive, clocks.now(), "stop_key", &pressed));
+        }
+        if let Some(went) = gone.look(&snapshot) {
+            inbox.record(fact(&drive, clocks.now(), "command_gone", &went));
         }
         for (set, tracker) in &mut sets {
             let Some((at, max_age, values)) = read(*set, &snapshot, &numbers) else { continue };
@@ -171,6 +159,17 @@ async fn follow(drive: DriveHandle, inbox: Inbox, clocks: Clocks) {
         if watch.changed().await.is_err() {
             return;
         }
+    }
+}
+
+/// What was seen of a drive here, as something that happened to it.
+fn fact<T: Display + Serialize>(drive: &DriveHandle, at: Moment, what: &str, fact: &T) -> Record {
+    Record {
+        kind: Kind::Event,
+        drive: Some(drive.name().to_string()),
+        line: Some(drive.line().0.to_string()),
+        body: serde_json::to_string(fact).ok(),
+        ..Record::of_history(at, what, fact.to_string())
     }
 }
 
@@ -193,15 +192,20 @@ fn read(set: Set, snapshot: &Snapshot, numbers: &BTreeSet<u16>) -> Option<Readin
 
 /// Keeps what the event stream tells.
 async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
-    let mut reader = plant.revisions().keeper();
-    let mut alarms = Alarms::default();
+    let (mut reader, is_gone) = plant.revisions().keeper();
+    if is_gone {
+        inbox.record(told_anew(clocks.now()));
+    }
+    let (mut alarms, mut reasons) = (Alarms::default(), Reasons::default());
     loop {
-        match plant.revisions().next(&mut reader).await {
+        let next = plant.revisions().next(&mut reader).await;
+        match next {
             Next::Frames(frames) => {
                 for frame in frames {
                     let frame = std::str::from_utf8(&frame).ok();
                     let told = frame.and_then(|frame| said(frame, clocks.now(), &mut alarms));
                     let Some(mut record) = told else { continue };
+                    reasons.look(&mut record);
                     // Whoever asks what else happened on a line finds it by that.
                     let drive = record.drive.as_ref().and_then(|drive| plant.fleet().drive(drive));
                     if record.line.is_none() {
@@ -220,15 +224,16 @@ async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
                 }
             }
             // A reload, or too much at once: whether something is missing nobody knows.
-            Next::Reset(_) => inbox.record(Record::of_history(
-                clocks.now(),
-                "stream_anew",
-                "the configuration was read again, or too much happened at once: what was told just before may be missing here",
-            )),
+            Next::Reset(_) => inbox.record(told_anew(clocks.now())),
             Next::End => return,
         }
         plant.revisions().is_kept(&reader);
     }
+}
+
+fn told_anew(now: Moment) -> Record {
+    let text = "the configuration was read again, or too much happened at once: what was told just before may be missing here";
+    Record::of_history(now, "stream_anew", text)
 }
 
 /// What a line said last, as JSON.
@@ -363,9 +368,37 @@ fn in_words(command: &CommandView) -> String {
     )
 }
 
+/// Tells when this program itself stood still: nobody was asked and nothing was seen in that time, whatever was missed by it.
+async fn pauses(inbox: Inbox, clocks: Clocks) {
+    let mut ticks = interval(PULSE);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut last = ticks.tick().await;
+    loop {
+        ticks.tick().await;
+        let now = Instant::now();
+        let paused = now.saturating_duration_since(last);
+        last = now;
+        tell_pause(&inbox, clocks, paused);
+    }
+}
+
+fn tell_pause(inbox: &Inbox, clocks: Clocks, paused: Duration) {
+    if paused < STOOD_STILL {
+        return;
+    }
+    let now = clocks.now();
+    let body = serde_json::json!({ "since_unix_ms": now.wall_ms - milliseconds(paused) });
+    let text = format!(
+        "this program stood still for {:.1} s until now: it asked nobody and saw nothing in that time",
+        paused.as_secs_f64()
+    );
+    inbox.record(Record { body: Some(body.to_string()), ..Record::of_history(now, "stood_still", text) });
+}
+
 /// Counts each line, minute by minute.
 async fn lines(plant: Plant, inbox: Inbox, clocks: Clocks) {
     let mut before: BTreeMap<Arc<str>, Counted> = BTreeMap::new();
+    let mut errors: BTreeMap<Arc<str>, Errors> = BTreeMap::new();
     let mut minutes = interval(MINUTE);
     minutes.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -385,6 +418,14 @@ async fn lines(plant: Plant, inbox: Inbox, clocks: Clocks) {
                 elapsed: stats.elapsed,
                 busy: stats.busy,
             };
+            if let Some(record) = errors.entry(Arc::clone(&name)).or_default().look(&stats) {
+                let drives = plant.fleet().drives_on(&name);
+                let of = |slave: u8| drives.iter().find(|drive| drive.slave().number() == slave);
+                let named = |slave| {
+                    of(slave).map_or_else(|| format!("address {slave}"), |drive| drive.name().to_string())
+                };
+                inbox.record(record.told(&name, clocks.now(), named));
+            }
             let last = before.insert(Arc::clone(&name), counted);
             // One that was opened anew, or is seen for the first time, counts from its beginning.
             let last = last.filter(|last| last.elapsed <= counted.elapsed).unwrap_or_default();
@@ -444,7 +485,57 @@ async fn tell(plant: Plant, mut health: watch::Receiver<Health>) {
 
 #[cfg(test)]
 mod tests {
+    use drived_config::rights::{Caller, Rights};
+    use drived_plant::plant::testing::TestPlant;
+
     use super::*;
+
+    #[tokio::test(start_paused = true)]
+    async fn what_a_drive_told_before_the_history_was_open_is_kept_once() {
+        let test = TestPlant::of(2).await;
+        let inbox = Inbox::default();
+        let kept = async || {
+            let (_health, seen) = watch::channel(Health::Writing);
+            let listening = Listening::start(&test.plant, &inbox, Clocks::begin(), seen);
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            drop(listening);
+            let records = inbox.take(Duration::ZERO).records.into_iter();
+            let connected = records.filter(|record| record.what == "connected");
+            connected.filter_map(|record| record.drive).collect::<Vec<_>>()
+        };
+        assert_eq!(kept().await, ["pump 1", "pump 2"]);
+        assert!(kept().await.is_empty(), "a history that was opened anew goes on where the one before ended");
+    }
+
+    #[test]
+    fn only_a_pause_that_no_busy_machine_makes_is_told_and_with_when_it_began() {
+        let (inbox, clocks) = (Inbox::default(), Clocks::begin());
+        tell_pause(&inbox, clocks, Duration::from_millis(700));
+        assert!(inbox.take(Duration::ZERO).records.is_empty());
+        tell_pause(&inbox, clocks, Duration::from_secs(15));
+        let told = inbox.take(Duration::ZERO).records.remove(0);
+        assert_eq!((&*told.what, told.kind), ("stood_still", Kind::History));
+        let since = format!("{{\"since_unix_ms\":{}}}", told.at.wall_ms - 15_000);
+        assert_eq!(told.body, Some(since));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn who_wrote_a_parameter_and_through_which_door_is_kept() {
+        let test = TestPlant::of(1).await;
+        let inbox = Inbox::default();
+        let (_health, seen) = watch::channel(Health::Writing);
+        let _listening = Listening::start(&test.plant, &inbox, Clocks::begin(), seen);
+        let drive = test.plant.fleet().drive("pump 1").unwrap();
+        let row = drive.capabilities().rows.iter().find(|row| row.code == "ACC").unwrap();
+        let anna = Caller::new("anna", "http 127.0.0.1", Rights::ALL);
+        test.plant.tell_written(&anna, &drive, row, 50, true);
+        tokio::time::sleep(Duration::from_millis(50)).await;
+        let records = inbox.take(Duration::ZERO).records;
+        let told = records.iter().find(|record| record.what == "parameter_written").unwrap();
+        assert_eq!(told.drive.as_deref(), Some("pump 1"));
+        // In which unit it counts Inr says, which nobody has read here.
+        assert_eq!(told.text, "parameter ACC written as 50 × Inr by anna from http 127.0.0.1");
+    }
 
     #[test]
     fn the_end_of_an_alarm_is_not_told_with_the_words_of_its_beginning() {
@@ -478,17 +569,6 @@ mod tests {
         };
         assert!(told(&all).starts_with("ramp stop of all 1 drives by anonymous"), "{}", told(&all));
         assert!(told(&one).starts_with("ramp stop by anonymous"), "{}", told(&one));
-    }
-
-    #[test]
-    fn a_program_that_stood_still_keeps_that_it_did_and_a_busy_one_does_not() {
-        for (late_ms, is_told) in [(900, false), (15_000, true)] {
-            let inbox = Inbox::default();
-            let at = |steady_ms| Moment { steady_ms, wall_ms: steady_ms };
-            standstill(&inbox, at(5_000), at(6_000 + late_ms));
-            let kept = inbox.take(Duration::ZERO).records;
-            assert_eq!(kept.iter().any(|record| record.what == "stood_still"), is_told, "{kept:?}");
-        }
     }
 
     #[test]

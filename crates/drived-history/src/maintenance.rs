@@ -9,6 +9,7 @@ use serde::Deserialize;
 use tokio::{sync::Notify, time::timeout};
 
 use crate::{
+    listen::Clocks,
     read::{Filter, History, Ran, bounds, ran, records},
     record::{Kind, Moment, Record},
     store::StoreError,
@@ -68,6 +69,19 @@ pub(crate) fn done(now: Moment, drive: &str, part: &str, by: &str, note: Option<
     }
 }
 
+/// The record that something is due: it happens at a moment, as everything else does.
+fn became_due(now: Moment, drive: &str, part: &str, why: &str) -> Record {
+    Record {
+        kind: Kind::Event,
+        drive: Some(drive.to_owned()),
+        body: Some(serde_json::json!({ "part": part }).to_string()),
+        ..Record::of_history(now, "maintenance_due", format!("maintenance is due: {why}"))
+    }
+}
+
+/// What is due: of which drive, which part, and why.
+type Due = (String, String, String);
+
 /// Counts until it is dropped, and tells the plant what is due.
 pub(crate) async fn count(
     path: PathBuf,
@@ -75,15 +89,18 @@ pub(crate) async fn count(
     plant: Plant,
     inbox: Inbox,
     done: Arc<Notify>,
+    clocks: Clocks,
 ) {
     if maintained.is_empty() {
         return;
     }
     let mut counts: Vec<Count> = maintained.into_iter().map(Count::new).collect();
+    // What was due at the beginning became so in another run, which has told it.
+    let mut known: Option<Vec<Due>> = None;
     loop {
-        let (path, inbox, mut next) = (path.clone(), inbox.clone(), counts.clone());
+        let (path, writing, mut next) = (path.clone(), inbox.clone(), counts.clone());
         let counted = tokio::task::spawn_blocking(move || {
-            inbox.have_written(WRITTEN_WITHIN);
+            writing.have_written(WRITTEN_WITHIN);
             let mut history = History::open(&path)?;
             // What becomes blocks meanwhile is counted once.
             let at_once = history.0.transaction()?;
@@ -94,6 +111,13 @@ pub(crate) async fn count(
         if let Ok(Ok(counted)) = counted.await {
             counts = counted;
             tell(&plant, &counts);
+            let due: Vec<Due> = counts.iter().filter_map(Count::due_of).collect();
+            if let Some(known) = &known {
+                due.iter().filter(|one| !known.contains(one)).for_each(|(drive, part, why)| {
+                    inbox.record(became_due(clocks.now(), drive, part, why));
+                });
+            }
+            known = Some(due);
         }
         let _ = timeout(COUNTED_EVERY, done.notified()).await;
     }
@@ -142,6 +166,12 @@ impl Count {
         // It is counted on from the moment of which something was known last.
         self.until = self.until.max(until.saturating_sub(1));
         Ok(())
+    }
+
+    /// The same with its drive.
+    fn due_of(&self) -> Option<Due> {
+        let (part, why) = self.due()?;
+        Some((self.maintained.drive.clone(), part, why))
     }
 
     /// Its name and why, where it is due.

@@ -12,7 +12,7 @@ use std::{collections::VecDeque, time::Duration};
 use tokio::time::Instant;
 
 use super::{Master, Purpose, port::PortState};
-use crate::{config::DOUBLE, shape::Shape};
+use crate::{config::DOUBLE, shape::Shape, stats::NOTHING_HEARD};
 
 /// How long a port that was opened again is listened to: a server that has kept something gives it in a round trip.
 const LISTEN: Duration = Duration::from_millis(100);
@@ -163,7 +163,7 @@ impl<C> Master<C> {
         self.fresh.heard = Some(now);
         self.fresh.in_vain = None;
         self.fresh.reopened = self.fresh.reopened.saturating_add(1);
-        Some(format!("nothing was heard for {:.1} s, whoever was asked", mute.as_secs_f64()))
+        Some(format!("{NOTHING_HEARD} for {:.1} s, whoever was asked", mute.as_secs_f64()))
     }
 
     /// When the port counts as mute, unless something is heard.

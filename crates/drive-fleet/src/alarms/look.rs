@@ -101,7 +101,9 @@ impl Look {
         let (mut there, mut kinds) = (Vec::new(), vec![AlarmKind::LineAway]);
         if let Some(why) = &seen.away {
             there.push(condition(AlarmKind::LineAway, None, Some(why.clone())));
-        } else if drives.iter().any(|drive| drive.link == Link::Connected) || drives.len() < 2 {
+        } else if drives.iter().any(|drive| drive.link == Link::Connected || drive.refuses())
+            || drives.len() < 2
+        {
             kinds.push(AlarmKind::LineSilent);
         } else if drives.iter().all(|drive| does_not_answer(drive)) {
             let heard = drives.iter().filter_map(|drive| drive.status.as_ref()).map(|status| status.at).max();

@@ -33,6 +33,8 @@ pub(crate) struct Checks {
     identity: IdentityCheck,
     remembered: Option<Arc<Identity>>,
     identity_at: Option<Instant>,
+    /// It was asked because it refuses to tell its status.
+    refused: bool,
     contract: Option<WatchdogContract>,
     /// Whether the bus can read it.
     readable: bool,
@@ -79,6 +81,7 @@ impl Checks {
             identity: IdentityCheck::Unchecked,
             remembered: settings.identity.clone().map(Arc::new),
             identity_at: None,
+            refused: false,
             contract: settings.watchdog,
             readable: capability.is_some(),
             settable: capability.is_some_and(|watchdog| watchdog.settable),
@@ -138,6 +141,7 @@ impl Checks {
     pub(crate) fn connected(&mut self, now: Instant) {
         self.identity = IdentityCheck::Unchecked;
         self.identity_at = Some(now);
+        self.refused = false;
         self.watchdog_at = Some(now);
         self.restarts = None;
         self.restarts_at = Some(now);
@@ -145,6 +149,16 @@ impl Checks {
             Some(_) => WatchdogCheck::Unchecked,
             None => WatchdogCheck::NoContract { found: None },
         };
+    }
+
+    /// It answers, and has nothing of what a status is made of: it is asked which drive it is, once until it is seen again.
+    pub(crate) fn refused(&mut self, now: Instant) {
+        if self.refused {
+            return;
+        }
+        self.refused = true;
+        self.identity = IdentityCheck::Unchecked;
+        self.identity_at = Some(now);
     }
 
     /// What this rests on has changed without this side: it is read anew.

@@ -323,7 +323,14 @@ impl Supervisor {
 
     /// What is done on the drive's turn, when it has it.
     fn choose_background(&mut self, now: Instant) -> Option<(Job, Option<Instant>)> {
-        let wanted = (self.link == Link::Connected).then(|| self.background_job(now)).flatten();
+        let wanted = match self.link {
+            Link::Connected => self.background_job(now),
+            // What answers and refuses is asked what it is, and nothing else.
+            _ => self
+                .checks
+                .identity_job(now)
+                .filter(|_| matches!(self.last_error, Some(Error::Exception { .. }))),
+        };
         let Some(job) = wanted else {
             self.turn = Turn::Unwanted;
             return None;
@@ -339,7 +346,9 @@ impl Supervisor {
         }
         let ends = self.pace.status_due().max(now + self.settings.periods.max_age / 3);
         self.turn_ends = Some(ends);
-        Some((job, Some(self.checks.feed_at().map_or(ends, |at| at.min(ends)))))
+        // Nobody feeds the watchdog of a drive that is lost.
+        let feed_at = self.checks.feed_at().filter(|_| self.link == Link::Connected);
+        Some((job, Some(feed_at.map_or(ends, |at| at.min(ends)))))
     }
 
     /// Whether the drive wants its turn.
@@ -429,7 +438,9 @@ impl Supervisor {
                     self.withdrawal = None;
                     self.end_writes();
                 }
-                self.adopt_run(now);
+                if self.link == Link::Connected {
+                    self.adopt_run(now);
+                }
             }
             Reply::Watchdog(result) if matches!(job, Some(Job::RestoreWatchdog(_))) => {
                 self.handle_restored(result);

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use drive_core::{Control, Error, Faults, Measurements, Motion, PortError, Result, Status};
+use drive_core::{Control, Error, ExceptionMeaning, Faults, Measurements, Motion, PortError, Result, Status};
 use tokio::time::Instant;
 
 use super::{Acted, Asker, Job, Supervisor};
@@ -32,6 +32,12 @@ fn somebody_else(status: &Status) -> Option<Control> {
     status.control.filter(|control| *control != Control::Bus)
 }
 
+/// Whether an exception may be that of a drive of another family: it has not what was asked for. A busy drive says something else.
+const fn is_of_another(error: &Error) -> bool {
+    use ExceptionMeaning::{NoSuchFunction, NoSuchRegister, ValueRefused};
+    matches!(error, Error::Exception { meaning: NoSuchFunction | NoSuchRegister | ValueRefused, .. })
+}
+
 /// The words that a status shows otherwise than the one before.
 fn changed_words(before: Option<&Status>, status: &Status) -> Arc<[ChangedWord]> {
     let Some(earlier) = before else { return Arc::default() };
@@ -55,6 +61,9 @@ impl Supervisor {
             }
             Err(error) => {
                 self.counters.missed += 1;
+                if self.link != Link::Connected && is_of_another(&error) {
+                    self.checks.refused(now);
+                }
                 // What this side had no time to ask says nothing of the drive.
                 self.doubtful |= !matches!(error, Error::Port { problem: PortError::Expired, .. });
             }

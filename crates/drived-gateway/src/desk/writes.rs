@@ -375,7 +375,8 @@ impl Desk {
             record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
             let written = timeout_at(deadline, drive.write_parameter(row, word)).await;
             let written = written.map_err(|_| pending(&drive))?;
-            written.map_err(|refused| Refusal::rule(format!("{}: {refused}", row.code)))?;
+            let written = written.map_err(|refused| Refusal::rule(format!("{}: {refused}", row.code)))?;
+            self.plant.tell_written(caller, &drive, row, word, written.changed);
         }
         Ok(())
     }
@@ -446,6 +447,7 @@ impl Desk {
             let Caller { name, origin, .. } = caller;
             tracing::warn!("gateway {name}: {origin}: {what}: {why} ({code:02X}h), {count} of these in all");
         }
+        let text = format!("{what} by {} from {} refused: {why}", caller.name, caller.origin);
         let record =
             Record { outcome: Some(format!("refused: {why}")), ..Record::new(Kind::Answer, caller, what) };
         self.audit.record(record).whenever();
@@ -454,7 +456,7 @@ impl Desk {
             "drive": drive,
             "event": "write_refused",
             "alarm": false,
-            "text": format!("{}, {}: {why}", caller.name, caller.origin),
+            "text": text,
         });
         self.plant.revisions().push(Subject::Event, &event);
     }

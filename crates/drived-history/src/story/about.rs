@@ -17,7 +17,7 @@ const FAR_MS: i64 = 10_000;
 /// What is heavier than what is asked for is told beside it within this time.
 const BESIDE_MS: i64 = 300_000;
 /// What a story is about, the weightiest first. `run`: a motor began or ceased to run.
-const WEIGHT: [&str; 24] = [
+const WEIGHT: [&str; 27] = [
     "tripped",
     "stop_unconfirmed",
     "other_family",
@@ -39,6 +39,9 @@ const WEIGHT: [&str; 24] = [
     "reset",
     "release",
     "setpoint",
+    "parameter_written",
+    "write_refused",
+    "maintenance_due",
     "state_changed",
     "warning",
     "control_returned",

@@ -34,17 +34,24 @@ pub(super) struct Body {
     pub(super) last_known_unix_ms: Option<i64>,
     #[serde(default)]
     pub(super) since_unix_ms: Option<i64>,
+    /// From where to where the clock was set.
+    #[serde(default)]
+    pub(super) from_unix_ms: Option<i64>,
+    #[serde(default)]
+    pub(super) to_unix_ms: Option<i64>,
     /// For how long a lost drive had been silent.
     #[serde(default)]
     pub(super) silent_for_ms: Option<u64>,
-    /// For how long the program stood still.
-    #[serde(default)]
-    pub(super) lasted_ms: Option<i64>,
     /// How many records could not be kept.
     #[serde(default)]
     pub(super) records: Option<u64>,
     #[serde(default)]
     pub(super) outcome: Option<String>,
+    /// What became of the reference of a run command that went.
+    #[serde(default)]
+    pub(super) reference_before_hz: Option<f64>,
+    #[serde(default)]
+    pub(super) reference_hz: Option<f64>,
     /// What a drive showed that was heard, for the first time or again.
     #[serde(default)]
     pub(super) status: Option<Shown>,

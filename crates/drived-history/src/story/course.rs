@@ -21,8 +21,10 @@ pub(super) fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
     let is_told = |found: &&RecordView| {
         let is_near = (moment - BEFORE_MS..=moment + AFTER_MS).contains(&found.time_unix_ms);
         let of_line = found.line.is_some() && found.line == facts.line;
-        let weighs =
-            matches!(&*found.what, "tripped" | "lost" | "connected" | "line_finding" | "stop_unconfirmed");
+        let weighs = matches!(
+            &*found.what,
+            "tripped" | "lost" | "connected" | "line_finding" | "line_errors" | "stop_unconfirmed"
+        );
         let is_meant = match &*found.kind {
             "event" => facts.is_of_drive(found) || of_line && weighs,
             "command" => facts.is_of_drive(found),
@@ -162,6 +164,10 @@ pub(super) fn not_known(facts: &Facts, moment: i64, is_about: bool) -> Vec<Sente
     if facts.is_cut {
         let text = "so much happened in the plant that the later part of it was not looked at";
         said.push(Sentence::of(Certainty::NotKnown, text));
+    }
+    if facts.to <= facts.from {
+        said.push(Sentence::of(Certainty::NotKnown, "the history does not reach to that moment"));
+        return said;
     }
     if let Some(after) = facts.ends_soon_after(moment) {
         let text = format!(

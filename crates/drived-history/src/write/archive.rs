@@ -163,7 +163,10 @@ impl Archive {
                 "the clock was set {way} by {:.1} s: the order of what is told here is that of the daemon's own clock",
                 moved.abs() as f64 / 1_000.0
             );
-            self.record(Record::of_history(now, "clock_stepped", text));
+            let was = now.wall_ms - moved;
+            let body = serde_json::json!({ "from_unix_ms": was, "to_unix_ms": now.wall_ms });
+            let body = Some(body.to_string());
+            self.record(Record { body, ..Record::of_history(now, "clock_stepped", text) });
         }
     }
 

@@ -106,6 +106,7 @@ pub(super) async fn write(
     // Nobody who goes away leaves it half done.
     let writing = tokio::spawn(async move {
         let written = plant.write_parameter(&drive, row, word).await?;
+        plant.tell_written(&caller, &drive, row, word, written.changed);
         if save && row.storage == Storage::RamUntilSaved {
             match drive.order(Order::Persist).await {
                 Outcome::Refused(refused) => return Err(refused),

@@ -16,9 +16,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::time::{Instant, timeout_at};
 
-use super::Plant;
+use super::{Plant, revisions::Subject};
+use drived_config::rights::Caller;
 use drived_words::{
-    json::milliseconds,
+    json::{milliseconds, unix},
     registers::{factory, range},
 };
 
@@ -269,6 +270,23 @@ impl Plant {
         let later = later.map(|needs| format!("; {needs}")).unwrap_or_default();
         let text = Some(format!("{} {how} {} ({kept}){later}", row.code, shown.show(word)));
         Ok(WrittenView { parameter: ParameterView { text, ..parameter }, changed })
+    }
+}
+
+impl Plant {
+    /// Tells that somebody has written a parameter, and what the drive holds now: it is an act like a command.
+    pub fn tell_written(&self, by: &Caller, drive: &DriveHandle, row: &Row, word: u16, changed: bool) {
+        let shown = self.0.words.in_units(drive, row).show(word);
+        let how = if changed { "written as" } else { "written, and it was already" };
+        let Caller { name, origin, .. } = by;
+        let event = serde_json::json!({
+            "time_unix_ms": unix(Instant::now()),
+            "drive": &**drive.name(),
+            "event": "parameter_written",
+            "alarm": false,
+            "text": format!("parameter {} {how} {shown} by {name} from {origin}", row.code),
+        });
+        self.0.revisions.push(Subject::Event, &event);
     }
 }
 

@@ -53,7 +53,7 @@ impl Subject {
 pub struct Revisions {
     ring: Mutex<Ring>,
     last: watch::Sender<u64>,
-    /// How far is kept.
+    /// How far the history has kept them.
     kept: AtomicU64,
 }
 
@@ -129,13 +129,13 @@ impl Revisions {
         Reader { since, last }
     }
 
-    /// The reader that keeps everything: from where it has kept, or from the oldest that is still there. What happened before it
-    /// began to read is told to it too, and nothing twice, also where it is opened anew.
-    pub fn keeper(&self) -> Reader {
+    /// The reader that keeps everything: from where it has kept, or from the oldest that is still there; and whether something
+    /// between them is gone. What happened before it began to read is told to it too, and nothing twice, also where it is opened anew.
+    pub fn keeper(&self) -> (Reader, bool) {
         let ring = self.ring();
         let oldest = ring.last - ring.frames.len() as u64;
-        let since = self.kept.load(Ordering::Relaxed).max(oldest);
-        Reader { since, last: self.last.subscribe() }
+        let kept = self.kept.load(Ordering::Relaxed);
+        (Reader { since: kept.max(oldest), last: self.last.subscribe() }, kept < oldest)
     }
 
     /// Everything up to where this reader has come is kept.
@@ -251,18 +251,22 @@ mod tests {
     async fn whoever_keeps_everything_gets_what_came_before_it_once_also_when_it_is_opened_anew() {
         let revisions = Revisions::new();
         revisions.push(Subject::Event, &1);
-        let mut keeper = revisions.keeper();
+        let (mut keeper, is_gone) = revisions.keeper();
+        assert!(!is_gone);
         revisions.push(Subject::Event, &2);
         let Next::Frames(frames) = revisions.next(&mut keeper).await else { panic!("frames") };
         assert_eq!(frames.len(), 2);
         revisions.is_kept(&keeper);
         revisions.push(Subject::Event, &3);
-        let Next::Frames(frames) = revisions.next(&mut revisions.keeper()).await else { panic!("frames") };
-        assert_eq!(frames.len(), 1);
+        let (mut anew, is_gone) = revisions.keeper();
+        let Next::Frames(frames) = revisions.next(&mut anew).await else { panic!("frames") };
+        assert_eq!((frames.len(), is_gone), (1, false));
         for number in 0..=KEPT {
             revisions.push(Subject::Event, &number);
         }
-        let Next::Frames(_) = revisions.next(&mut revisions.keeper()).await else {
+        let (mut late, is_gone) = revisions.keeper();
+        assert!(is_gone, "that something is missing is known");
+        let Next::Frames(_) = revisions.next(&mut late).await else {
             panic!("what is gone is gone, and the rest is told")
         };
     }

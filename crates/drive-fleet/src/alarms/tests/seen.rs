@@ -155,3 +155,35 @@ fn a_line_is_silent_when_nobody_of_several_answers_and_back_when_one_does() {
     let away = LineSeen { away: Some("no such device".to_owned()), findings: None };
     assert_eq!(kinds(&[&dead, &dead], &away), (vec![AlarmKind::LineAway], false));
 }
+
+#[test]
+fn a_drive_that_answers_by_exceptions_does_not_count_as_silent() {
+    let now = Instant::now();
+    let mut alarms = Alarms::default();
+    let slave = drive_core::SlaveAddress::try_from(1).unwrap();
+    let exchange = drive_core::Exchange { function: 3, register: Some(3201) };
+    let meaning = drive_core::ExceptionMeaning::NoSuchRegister;
+    let silent = lost(showing(State::Ready, Motion::AtRest, now));
+    let error = Some(Error::Exception { slave, exchange, code: 2, meaning });
+    let refusing = Snapshot { error, ..silent.clone() };
+    alarms.look(&[Look::at_drive("north", &silent, moment(now))], 10);
+    alarms.look(&[Look::at_drive("north", &refusing, moment(now))], 20);
+    assert!(!is_active(&alarms, ConcernKind::Lost) && is_active(&alarms, ConcernKind::Refuses));
+    let line = Look::at_line("north", &[&silent, &refusing], &LineSeen::default(), moment(now));
+    assert!(line.there.is_empty() && line.seen.contains(&AlarmKind::LineSilent), "{line:?}");
+    alarms.look(&[Look::at_drive("north", &silent, moment(now))], 30);
+    assert!(is_active(&alarms, ConcernKind::Lost) && !is_active(&alarms, ConcernKind::Refuses));
+}
+
+#[test]
+fn a_port_that_is_opened_anew_because_nobody_answers_is_not_away() {
+    let mut stats = drive_bus::stats::Stats::default();
+    (stats.opened, stats.lost) = (3, 3);
+    // As in the night whose line was cut: the adapter was there all the time.
+    stats.away = Some("nothing was heard for 8.0 s, whoever was asked".to_owned());
+    assert_eq!(stats.port_away(), None);
+    stats.away = Some("there is no serial port /dev/ttyUSB0".to_owned());
+    assert_eq!(stats.port_away(), Some("there is no serial port /dev/ttyUSB0"));
+    stats.opened = 4;
+    assert_eq!(stats.port_away(), None, "it is open");
+}

@@ -164,3 +164,39 @@ fn a_drive_that_is_exchanged_for_one_of_another_family_has_no_run_command_withdr
         .any(|output| matches!(output, Output::Told(asked, Err(Refused::OtherFamily(_))) if *asked == id));
     assert!(refused, "{:?}", rig.outputs);
 }
+
+#[test]
+fn a_drive_of_another_family_that_answers_by_exceptions_is_told_as_such_and_as_no_silence() {
+    let mut rig = Rig::ready();
+    rig.drive.refuses = Some((3, ExceptionMeaning::ValueRefused));
+    rig.drive.recognised = AN_ATV71;
+    rig.drive.log.clear();
+    rig.pass(50_000 * MS);
+    let kinds: Vec<_> = rig.snapshot().concerns(rig.now).into_iter().map(|concern| concern.kind).collect();
+    assert_eq!(kinds, [ConcernKind::OtherFamily, ConcernKind::Refuses]);
+    assert_eq!(
+        rig.events().iter().filter(|event| **event == "other family").count(),
+        1,
+        "{:?}",
+        rig.events()
+    );
+    assert_eq!(rig.drive.writes(), []);
+    assert_eq!(rig.drive.log.iter().filter(|job| **job == Job::Identify).count(), 1, "{:?}", rig.drive.log);
+    rig.drive.refuses = None;
+    rig.drive.recognised = Recognised::CannotTell;
+    rig.pass(3_000 * MS);
+    assert_eq!(rig.snapshot().concerns(rig.now), [], "the right one is there again");
+}
+
+#[test]
+fn a_drive_that_is_busy_for_long_is_not_silent_and_is_asked_nothing_else() {
+    let mut rig = Rig::ready();
+    rig.drive.refuses = Some((6, ExceptionMeaning::Busy));
+    rig.drive.log.clear();
+    rig.pass(10_000 * MS);
+    let concerns = rig.snapshot().concerns(rig.now);
+    let told: Vec<_> = concerns.iter().map(ToString::to_string).collect();
+    let text = "answers, and refuses to tell its status: slave 1, reading register 3201 (0C81h): exception 06h, the drive is busy";
+    assert_eq!(told, [text]);
+    assert!(!rig.drive.log.contains(&Job::Identify), "{:?}", rig.drive.log);
+}

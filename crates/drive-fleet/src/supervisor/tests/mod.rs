@@ -11,9 +11,9 @@ mod questions;
 mod stops;
 
 use drive_core::{
-    Command, Control, Direction, Exchange, Frequency, Identity, Lack, Lease, Measurements, Motion, PortError,
-    Reaction, Recognised, Refusal, Result, SelfRestart, SlaveAddress, State, StopMode, Stopped, Verdict,
-    Watchdog, Withdrawn, Written, registers::Storage,
+    Command, Control, Direction, ExceptionMeaning, Exchange, Frequency, Identity, Lack, Lease, Measurements,
+    Motion, PortError, Reaction, Recognised, Refusal, Result, SelfRestart, SlaveAddress, State, StopMode,
+    Stopped, Verdict, Watchdog, Withdrawn, Written, registers::Storage,
 };
 
 use super::*;
@@ -41,6 +41,8 @@ struct Paper {
     reference: Option<drive_core::Setpoint>,
     /// The error of every job while it lasts.
     failing: Option<PortError>,
+    /// By which exception it answers whoever asks for its status, and what that means.
+    refuses: Option<(u8, ExceptionMeaning)>,
     /// A command is carried out and its answer is lost, once.
     loses_answer: bool,
     /// What a run command does; `false`: nothing.
@@ -90,7 +92,7 @@ fn port_error(problem: PortError) -> Error {
 /// A write that the drive refuses by exception 04.
 fn not_now(register: u16) -> Error {
     let exchange = Exchange { function: 6, register: Some(register) };
-    Error::Exception { slave: slave(), exchange, code: 4, meaning: drive_core::ExceptionMeaning::NotNow }
+    Error::Exception { slave: slave(), exchange, code: 4, meaning: ExceptionMeaning::NotNow }
 }
 
 impl Paper {
@@ -109,6 +111,7 @@ impl Paper {
             watchdog: Watchdog { timeout: None, reaction: None },
             reference: None,
             failing: None,
+            refuses: None,
             loses_answer: false,
             obeys: true,
             stops_by: None,
@@ -188,6 +191,10 @@ impl Paper {
     }
 
     fn status(&mut self) -> Result<Status> {
+        if let Some((code, meaning)) = self.refuses {
+            let exchange = Exchange { function: 3, register: Some(3201) };
+            return Err(Error::Exception { slave: slave(), exchange, code, meaning });
+        }
         let status = Status { verdict: self.verdict(), ..self.status.clone() };
         self.result(status)
     }

@@ -10,7 +10,8 @@ use super::{
         body::body,
         facts::{Facts, begins, lasting},
     },
-    evidence::{is_of_supply, loss_before, lost_before},
+    evidence::{is_of_supply, loss_before},
+    word::{Went, how_it_went},
 };
 
 /// Drives that fell silent within this time of each other may have done so together: so much the polls and their repetitions lie apart.
@@ -33,7 +34,7 @@ pub(super) enum Shows {
     /// It was fed all the time, for this.
     Fed(Sentence),
     /// It was not, as far as that is likely, for this.
-    Unfed(Option<Sentence>),
+    Unfed(Sentence),
     /// It was another drive, for this.
     Another(Sentence),
     /// Its fault was gone.
@@ -52,7 +53,11 @@ impl Back {
             Sentence::of(Seen, text).at(connected.time_unix_ms)
         });
         let another = connected.and_then(|back| another(facts, back)).map(Shows::Another);
-        let gone = || command_gone(facts, lost).map(|gone| Shows::Unfed(of_supply(facts, gone)));
+        let gone = || match how_it_went(facts, command_gone(facts, lost)?) {
+            Went::Unfed(sentence) => Some(Shows::Unfed(sentence)),
+            Went::ByWord(sentence) => Some(Shows::Fed(sentence)),
+            Went::Open(_) => None,
+        };
         let shown = || connected.and_then(|back| fed(facts, back));
         let reset = || connected.and_then(|back| reset(facts, back)).map(Shows::Reset);
         let shows = another.or_else(gone).or_else(shown).or_else(reset).unwrap_or(Shows::Nothing);
@@ -62,8 +67,10 @@ impl Back {
     /// What is told of it: how it came back, and what speaks for or against its supply.
     pub(super) fn told(self) -> Vec<Sentence> {
         let of_supply = match self.shows {
-            Shows::Fed(sentence) | Shows::Another(sentence) | Shows::Reset(sentence) => Some(sentence),
-            Shows::Unfed(sentence) => sentence,
+            Shows::Fed(sentence)
+            | Shows::Unfed(sentence)
+            | Shows::Another(sentence)
+            | Shows::Reset(sentence) => Some(sentence),
             Shows::Nothing => None,
         };
         self.heard.into_iter().chain(of_supply).collect()
@@ -130,7 +137,7 @@ fn fed(facts: &Facts, connected: &RecordView) -> Option<Shows> {
         let words = facts.in_words(trip);
         if is_of_supply(&words) {
             let text = format!("{words}: the drive itself speaks of its supply");
-            return Some(Shows::Unfed(Some(Sentence::of(Likely, text).at(at))));
+            return Some(Shows::Unfed(Sentence::of(Likely, text).at(at)));
         }
         let text = format!(
             "{words}: a watchdog acts in a drive that is fed and not spoken to, so that its supply was not away",
@@ -144,12 +151,4 @@ fn fed(facts: &Facts, connected: &RecordView) -> Option<Shows> {
         && with_it("state_changed").is_none();
     let text = "it ran on when it was heard again, and a run command of a bus does not outlast the supply of its drive: that was not away";
     runs_on.then(|| Shows::Fed(Sentence::of(Likely, text).at(at)))
-}
-
-/// That a drive whose run command was gone when it was seen again had lost its supply: what else takes a run command away while a drive is silent
-/// is somebody who writes to a drive that does not answer here.
-pub(super) fn of_supply(facts: &Facts, back: &RecordView) -> Option<Sentence> {
-    lost_before(facts, back.time_unix_ms)?;
-    let text = "when it was seen again its run command was gone, as it is behind a loss of supply: its supply was away";
-    Some(Sentence::of(Likely, text).at(back.time_unix_ms))
 }

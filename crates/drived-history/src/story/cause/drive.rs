@@ -12,25 +12,31 @@ use super::{
         body::{Cause, body},
         facts::{Facts, begins},
     },
-    back::{SILENT_TOGETHER_MS, of_supply},
+    back::SILENT_TOGETHER_MS,
     evidence::{
-        BESIDE_MS, SILENT_MS, asked_before, found_within, inputs_stayed, loss_before, lost_before, names,
-        nobody_asked, seen_beside,
+        BESIDE_MS, OBEYED_MS, SILENT_MS, asked_before, found_within, inputs_stayed, loss_before, lost_before,
+        names, nobody_asked, seen_beside,
     },
+    word::{ONE_READING_MS, Went, how_it_went, of_reference},
 };
 
 /// What somebody or something did at the drive itself.
 pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, open: &str) -> Vec<Sentence> {
-    let mut all = Vec::new();
-    if matches!(&*about.what, "command_overridden" | "run_not_adopted")
-        && let Some(supply) = of_supply(facts, about)
-    {
-        all.push(supply);
-        all.extend(silent_with(facts, about.time_unix_ms));
+    let has_gone = matches!(&*about.what, "command_overridden" | "run_not_adopted");
+    let (mut all, mut by_word) = (Vec::new(), None);
+    match has_gone.then(|| how_it_went(facts, about)) {
+        Some(Went::Unfed(supply)) => {
+            all.push(supply);
+            all.extend(silent_with(facts, about.time_unix_ms));
+        }
+        Some(Went::ByWord(word)) => by_word = Some(word),
+        Some(Went::Open(open)) => by_word = open,
+        None => {}
     }
     all.push(said);
+    all.extend(of_reference(facts, about).filter(|_| has_gone));
     all.extend(lost_before(facts, about.time_unix_ms));
-    all.extend(of_word(facts, about));
+    all.extend(by_word);
     all.extend(acted_upon(facts, about));
     all.extend(seen_beside(facts, about.time_unix_ms));
     if about.what == "output_blocked" {
@@ -40,14 +46,12 @@ pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, op
     all
 }
 
-/// That it was heard all the time in which its run command went: a power cycle was shorter than two polls, if it was one.
-fn of_word(facts: &Facts, about: &RecordView) -> Option<Sentence> {
-    let at = about.time_unix_ms;
-    let is_heard = facts.is_heard(at - BESIDE_MS / 30, at) && loss_before(facts, at).is_none();
-    let is_open = about.text.contains("power cycle") && is_heard;
-    is_open.then(|| {
-        let text = "it was heard all the time: another word was written to it, as another master does, or its supply was away for less than two polls; which of them is not known";
-        Sentence::of(NotKnown, text)
+/// That its STOP key has stopped its motor, as its status said with what it shows or shortly before.
+fn stop_key(facts: &Facts, at: i64) -> Option<&RecordView> {
+    facts.records.iter().find(|found| {
+        found.what == "stop_key"
+            && found.drive.as_deref() == Some(&*facts.drive)
+            && (at - OBEYED_MS..=at + ONE_READING_MS).contains(&found.time_unix_ms)
     })
 }
 
@@ -167,6 +171,13 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             let (mut said, at) = (Vec::new(), about.time_unix_ms);
             let changed = body(about);
             let begins_to_run = changed.to.as_deref() == Some("running");
+            if let Some(key) = stop_key(facts, at).filter(|_| !begins_to_run) {
+                said.push(
+                    Sentence::of(Said, format!("the drive says so: {}", key.text)).at(key.time_unix_ms),
+                );
+                said.push(Sentence::of(NotKnown, "who pressed it cannot be seen from the line"));
+                return said;
+            }
             let shown = shown_before(facts, about).filter(|_| !begins_to_run);
             if let Some(shown) = shown {
                 let text =

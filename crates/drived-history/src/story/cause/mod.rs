@@ -12,10 +12,15 @@
 //! | the time at low speed | likely | the drive names it among others, a setpoint came before, and no input changed |
 //! | its supply | likely | it was silent, and its run command was gone when it was seen again |
 //! | its cable, and not its supply | likely | it was silent, and when it was heard again it ran on by a bus, or its watchdog had acted |
+//! | its supply, and no other word | likely | its reference went to 0 with its run command |
+//! | another word, and no power cycle | likely | its run command went, and its reference stayed |
 //! | what feeds several | likely | its supply was away, and others fell silent with it |
 //! | its fault was reset, or it was switched off and on | likely | it had tripped, fell silent, and its fault was gone when it was heard again |
 //! | what spoils answers on the line | likely | it was lost by answers that were damaged |
 //! | another drive in its place | said | it names another one when it is heard again |
+//! | that it was not cut off | said | it was lost, and had answered by an exception |
+//! | its STOP key | said | its status has a bit for it, and that was set with the stop |
+//! | that this program did not ask | seen | it stood still for most of the silence |
 //! | what a line's drives share | likely | they fell silent together, and nobody of them answered meanwhile |
 //! | what lines share | likely | drives of other lines fell silent with it |
 //! | one cause of several trips | likely | within two seconds, and by the same, or all by the supply |
@@ -29,6 +34,7 @@ mod drive;
 mod evidence;
 mod silence;
 mod trip;
+mod word;
 
 use drived_plant::plant::past::{
     Certainty::{Likely, NotKnown, Said, Seen},
@@ -73,12 +79,22 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         _ if about.kind == "command" => of_command(facts, about),
         _ => vec![Sentence::of(Seen, about.text.clone())],
     };
-    said.extend(program(facts, about.time_unix_ms));
+    let of_program = program(facts, about.time_unix_ms);
+    let is_told = |one: &Sentence| said.iter().any(|told| told.text == one.text);
+    let of_program: Vec<Sentence> = of_program.into_iter().filter(|one| !is_told(one)).collect();
+    said.extend(of_program);
     said
 }
 
 /// That nothing happened, or that nobody knows.
 pub(super) fn of_nothing(facts: &Facts, at: i64, has_moved: bool) -> Vec<Sentence> {
+    if let Some(step) = &facts.skipped {
+        let text = format!(
+            "there was no such time: {}. What happened is told under the new time, from then on",
+            step.text
+        );
+        return vec![Sentence::of(Seen, text).at(step.time_unix_ms)];
+    }
     let mut said = match facts.gap_at(at) {
         Some((start, end)) => vec![
             Sentence::of(

@@ -1,7 +1,7 @@
 //! Why a drive fell silent, and why it heard nothing.
 
 use drived_plant::plant::past::{
-    Certainty::{Likely, NotKnown, Seen},
+    Certainty::{Likely, NotKnown, Said, Seen},
     RecordView, SentenceView as Sentence,
 };
 
@@ -11,7 +11,7 @@ use super::{
         facts::{Facts, begins, lasting},
     },
     back::{Back, SILENT_TOGETHER_MS, Shows},
-    evidence::{SILENT_MS, TOGETHER_MS, minute, names},
+    evidence::{BESIDE_MS, SILENT_MS, TOGETHER_MS, names},
 };
 
 /// Why a drive heard nothing for so long that its watchdog acted.
@@ -62,22 +62,30 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         ];
     }
     let began = begins(about);
-    let still = facts.records.iter().find(|found| {
-        let lasted = body(found).lasted_ms.unwrap_or_default();
-        found.what == "stood_still"
-            && (found.time_unix_ms - lasted - TOGETHER_MS..=at + TOGETHER_MS).contains(&began)
-            && found.time_unix_ms >= began
-    });
-    if let Some(still) = still {
-        return vec![
+    let back = Back::behind(facts, about);
+    // Nobody was asked: that they answered nothing tells nothing of them.
+    if let Some(still) = stood_still(facts, began, at) {
+        return [
             Sentence::of(Seen, still.text.clone()).at(still.time_unix_ms),
             Sentence::of(NotKnown, "whether it would have answered meanwhile: nobody asked it"),
-        ];
+        ]
+        .into_iter()
+        .chain(back.told())
+        .collect();
+    }
+    if about.text.contains(": exception ") {
+        let text = "it answered, by exceptions: neither its supply nor its cable was away, and it did not tell its status";
+        return [
+            Sentence::of(Said, text),
+            Sentence::of(NotKnown, "whether it is busy, or another drive than it is set up as"),
+        ]
+        .into_iter()
+        .chain(back.told())
+        .collect();
     }
     let mut lost = facts.elsewhere("lost", at, 2 * TOGETHER_MS);
     lost.retain(|other| (begins(other) - began).abs() <= SILENT_TOGETHER_MS);
     let answered = facts.heard_between(began, began + SILENT_TOGETHER_MS);
-    let back = Back::behind(facts, about);
     let (on_line, elsewhere): (Vec<&RecordView>, Vec<&RecordView>) =
         lost.into_iter().partition(|found| found.line == facts.line);
     if !elsewhere.is_empty() {
@@ -119,23 +127,17 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
 
 /// What is told of a drive of which nothing that could be used was heard, because what it answered was damaged.
 fn damaged(facts: &Facts, about: &RecordView) -> Option<Vec<Sentence>> {
-    if about.text.contains("exception ") {
-        let text = "it was heard: it answered, and by its answer did not say how it is";
-        return Some(vec![
-            Sentence::of(Seen, text),
-            Sentence::of(NotKnown, "why it answered so is known to the drive alone"),
-        ]);
-    }
     let words = ["was damaged", "does not fit the request"];
     words.iter().any(|words| about.text.contains(words)).then_some(())?;
     let mut said = vec![Sentence::of(Seen, "it was heard: what came of its answers was damaged")];
-    if let Some(minute) = minute(facts, begins(about)) {
-        let text = format!(
-            "on its line {} of {} answers were damaged in the minute until then, whoever gave them",
-            minute.damaged,
-            minute.damaged + minute.answered
-        );
-        said.push(Sentence::of(Seen, text).at(minute.time_unix_ms));
+    let began = begins(about);
+    let errors = facts.records.iter().find(|found| {
+        found.what == "line_errors"
+            && found.line == facts.line
+            && (began..=began + BESIDE_MS).contains(&found.time_unix_ms)
+    });
+    if let Some(errors) = errors {
+        said.push(Sentence::of(Seen, format!("on its line {}", errors.text)).at(errors.time_unix_ms));
     }
     said.push(Sentence::of(
         Likely,
@@ -203,6 +205,15 @@ fn on_its_line(with_it: &[&RecordView], answered: &[&str], back: Back) -> Vec<Se
     said.push(Sentence::of(Likely, shared));
     said.extend(back.told());
     said
+}
+
+/// That this program itself stood still for most of a silence.
+fn stood_still(facts: &Facts, from: i64, to: i64) -> Option<&RecordView> {
+    facts.records.iter().find(|found| {
+        let since = body(found).since_unix_ms.unwrap_or(found.time_unix_ms);
+        let shared = found.time_unix_ms.min(to) - since.max(from);
+        found.what == "stood_still" && shared * 2 >= to - from
+    })
 }
 
 /// An alarm as far as it is looked at here.

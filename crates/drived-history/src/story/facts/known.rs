@@ -67,6 +67,7 @@ impl Facts {
                     (body.since_unix_ms.unwrap_or(i64::MIN), "records could not be kept")
                 }
                 "damaged" => (i64::MIN, "what was kept before was damaged"),
+                "stood_still" => (body.since_unix_ms.unwrap_or(at), "this program stood still"),
                 "stream_anew" => (at - TOLD_AGAIN_MS, "what was told may have been missed"),
                 _ => continue,
             };

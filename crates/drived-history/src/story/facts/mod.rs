@@ -10,6 +10,7 @@ use rusqlite::Connection;
 
 use self::known::{gaps, heard, known_spans};
 pub(super) use self::{found::begins, known::lasting};
+use super::body::body;
 use crate::{
     quantity::Quantity,
     read::{Filter, Found, bounds, line_minutes, pieces, records},
@@ -48,6 +49,8 @@ pub(super) struct Facts {
     pub(super) heard: Vec<(String, Vec<(i64, i64)>)>,
     /// What its line counted, minute by minute.
     pub(super) minutes: Vec<LineMinuteView>,
+    /// That the clock was set forward over the moment, so that there was no such time.
+    pub(super) skipped: Option<RecordView>,
 }
 
 /// What a drive shows when it is seen again is told of it within this time.
@@ -65,6 +68,8 @@ const SHOWN: [&str; 10] = [
     "reference_taken",
     "command_overridden",
 ];
+/// A clock that was set forward by more than this skipped no time that somebody would ask for.
+const SKIPPED_MS: i64 = 24 * 60 * 60_000;
 /// So many other drives of a line are looked at, whether they were heard.
 const NEIGHBOURS: usize = 64;
 
@@ -77,6 +82,7 @@ impl Facts {
         let to = (at + AFTER_MS).min(last).max(from);
         let filter = Filter { from_ms: from, to_ms: to, limit: RECORDS, ..Filter::default() };
         let Found { records, is_cut } = records(connection, &filter)?;
+        let skipped = skipped(connection, at)?;
         let of_drive = |found: &&RecordView| found.drive.as_deref() == Some(drive);
         let line = records.iter().filter(of_drive).find_map(|found| found.line.clone());
         let spans = heard(connection, drive, from, to)?;
@@ -113,6 +119,7 @@ impl Facts {
             controls,
             heard: Vec::new(),
             minutes,
+            skipped,
         };
         let neighbours: Vec<String> =
             facts.neighbours().into_iter().take(NEIGHBOURS).map(str::to_owned).collect();
@@ -129,4 +136,20 @@ impl Facts {
         let names = self.records.iter().filter(is_near).filter_map(|found| found.drive.as_deref());
         names.filter(|name| *name != self.drive).collect()
     }
+}
+
+/// The step of the clock that skipped a moment.
+fn skipped(connection: &Connection, at: i64) -> Result<Option<RecordView>, StoreError> {
+    let steps = Filter {
+        what: Some("clock_stepped"),
+        from_ms: at,
+        to_ms: at.saturating_add(SKIPPED_MS),
+        limit: RECORDS,
+        ..Filter::default()
+    };
+    let mut steps = records(connection, &steps)?.records.into_iter();
+    Ok(steps.find(|step| {
+        let step = body(step);
+        step.from_unix_ms.zip(step.to_unix_ms).is_some_and(|(from, to)| (from..to).contains(&at))
+    }))
 }

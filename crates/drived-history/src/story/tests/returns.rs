@@ -156,3 +156,119 @@ fn a_word_that_went_while_the_drive_was_heard_may_have_gone_by_a_power_cycle_bet
         assert_eq!(open.contains("away for less than two polls"), is_heard, "{story:?}");
     }
 }
+
+#[test]
+fn a_run_command_that_went_is_told_by_what_became_of_its_reference_and_not_by_that_it_was_heard() {
+    // What a drive shows that was off for less than a look at it lasts, and what another master leaves that only stops it.
+    for (name, reference, told, not) in [
+        ("supply", Some(0.0), "its supply was away", "was not away"),
+        ("word", Some(30.0), "another word was written to it", "its supply was away"),
+        ("untold", None, "", "its supply was"),
+    ] {
+        let mut night = Written::begin(&format!("word-{name}"));
+        night.heard_between(&[(0, 400)]);
+        let text =
+            "command overridden: another word, or a power cycle, that took the place of the run command";
+        night.event(300_000, "command_overridden", text, None);
+        if let Some(reference) = reference {
+            let body = json!({ "reference_before_hz": 30.0, "reference_hz": reference, "unread_ms": 600 });
+            night.event(300_010, "command_gone", "its run command went", Some(body));
+        }
+        let story = night.told(300_000);
+        let likely = story.why(Certainty::Likely);
+        assert!(likely.contains(told) && !likely.contains(not), "{name}: {story:?}");
+        assert!(story.about.as_ref().unwrap().text.starts_with("command overridden"), "{story:?}");
+        let open = story.why(Certainty::NotKnown);
+        assert_eq!(open.contains("away for less than two polls"), reference.is_none(), "{story:?}");
+    }
+}
+
+#[test]
+fn a_loss_of_two_seconds_is_told_with_the_run_command_that_went_in_it() {
+    let mut night = Written::begin("short-loss-gone");
+    night.heard_between(&[(0, 400)]);
+    night.event(299_000, "lost", "lost for 1.9 s: no answer", Some(json!({ "silent_for_ms": 1_900 })));
+    night.event(301_000, "connected", "connected: disabled", heard("disabled", "bus"));
+    let text = "command overridden: another word, or a power cycle, that took the place of the run command";
+    night.event(301_000, "command_overridden", text, None);
+    let story = night.told(301_000);
+    assert!(
+        story.why(Certainty::Seen).contains("nothing had been heard of it before, for 3.9 s"),
+        "{story:?}"
+    );
+    assert!(story.why(Certainty::Likely).contains("its supply was away"), "{story:?}");
+}
+
+#[test]
+fn a_motor_that_its_stop_key_has_stopped_is_told_so_by_the_drive() {
+    let mut night = Written::begin("key");
+    night.heard_between(&[(0, 400)]);
+    night.stops(300_000);
+    night.event(300_005, "stop_key", "stopped by the STOP key of the drive", None);
+    let story = night.told(300_000);
+    assert!(story.why(Certainty::Said).contains("stopped by the STOP key"), "{story:?}");
+    assert!(!story.why(Certainty::NotKnown).contains("another master"), "{story:?}");
+}
+
+#[test]
+fn a_silence_in_which_this_program_stood_still_is_told_as_its_own() {
+    let mut night = Written::begin("frozen");
+    night.heard_between(&[(0, 290), (306, 400)]);
+    for drive in ["pump 1", "pump 2"] {
+        let body = json!({ "silent_for_ms": 15_300 });
+        night.kept(Kind::Event, Some(drive), 305_300, "lost", "lost for 15.3 s", Some(body));
+    }
+    let body = json!({ "since_unix_ms": super::NIGHT_MS + 290_300 });
+    let text = "this program stood still for 15.0 s until now: it asked nobody and saw nothing in that time";
+    night.kept(Kind::History, None, 305_310, "stood_still", text, Some(body));
+    let story = night.told(305_300);
+    assert!(story.why(Certainty::Seen).contains("stood still for 15.0 s"), "{story:?}");
+    assert!(!story.why(Certainty::Seen).contains("fell silent"), "{story:?}");
+    assert_eq!(story.why(Certainty::Likely), "", "{story:?}");
+}
+
+#[test]
+fn a_drive_that_answers_by_exceptions_has_no_cable_to_look_at() {
+    let mut night = Written::begin("by-exceptions");
+    night.heard_between(&[(0, 290), (300, 400)]);
+    let text = "lost for 3.4 s: slave 2, reading register 3201 (0C81h): exception 06h, the drive is busy";
+    night.event(293_400, "lost", text, Some(json!({ "silent_for_ms": 3_400 })));
+    night.event(300_000, "connected", "connected: running", heard("running", "bus"));
+    let story = night.told(293_400);
+    assert!(story.why(Certainty::Said).contains("it answered, by exceptions"), "{story:?}");
+    assert!(!story.why(Certainty::Likely).contains("cable"), "{story:?}");
+}
+
+#[test]
+fn an_hour_over_which_the_clock_was_set_is_told_as_one_that_was_not() {
+    let mut night = Written::begin("no-such-hour");
+    night.heard_between(&[(0, 290)]);
+    let (from, to) = (super::NIGHT_MS + 290_000, super::NIGHT_MS + 290_000 + 3_600_000);
+    let body = json!({ "from_unix_ms": from, "to_unix_ms": to });
+    night.kept(
+        Kind::History,
+        None,
+        3_890_000,
+        "clock_stepped",
+        "the clock was set forward by 3600.0 s",
+        Some(body),
+    );
+    let story = night.told(700_000);
+    assert!(story.why(Certainty::Seen).contains("there was no such time"), "{story:?}");
+    assert_eq!(story.why[0].time_unix_ms, Some(to));
+}
+
+#[test]
+fn a_reference_that_stayed_through_a_silence_speaks_against_its_supply() {
+    let story = silence("silent-word", false, |night| {
+        command_gone(night);
+        let body = json!({ "reference_before_hz": 30.0, "reference_hz": 30.0, "unread_ms": 7_900 });
+        night.event(306_010, "command_gone", "its run command went", Some(body));
+    });
+    let likely = story.why(Certainty::Likely);
+    assert!(
+        likely.contains("its supply was not away") && !likely.contains("its supply was away"),
+        "{story:?}"
+    );
+    assert!(likely.contains("its own branch of the cable"), "{story:?}");
+}

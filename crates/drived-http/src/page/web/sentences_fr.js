@@ -73,6 +73,7 @@ export const SENTENCES_FR = {
   'set it at the drive, or change the contract': 'la régler sur le variateur, ou changer le contrat',
   'stop the motor: it is set up at standstill': 'arrêter le moteur : elle est réglée à l’arrêt',
   'look at its supply, its address and its cable': 'voir son alimentation, son adresse et son câble',
+  'see which drive it is, and whether it is set up as that': 'voir quel variateur c’est, et s’il est configuré comme tel',
   'see how busy its line is': 'voir à quel point sa ligne est chargée',
   'switch them off at the drive, or accept them by name': 'les désactiver sur le variateur, ou les accepter par leur nom',
   'look at load, fan and filters': 'voir la charge, le ventilateur et les filtres',

@@ -149,6 +149,7 @@ const TABLE = {
   concern_watchdog_broken: ['its watchdog is not as the contract says', 'sa surveillance n’est pas conforme au contrat'],
   concern_watchdog_not_in_force: ['its motor turns without the watchdog of its contract', 'son moteur tourne sans la surveillance de son contrat'],
   concern_lost: ['does not answer', 'ne répond pas'],
+  concern_refuses: ['answers, and refuses to tell its status', 'répond, et refuse de dire son état'],
   concern_stale: ['what it shows is old', 'ce qu’il montre est ancien'],
   concern_restarts_itself: ['its own settings start the motor again by themselves', 'ses propres réglages redémarrent le moteur seuls'],
   concern_eeprom_worn: ['its EEPROM is written more often than it lasts', 'son EEPROM est écrite plus souvent qu’elle ne dure'],

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, sync::Arc, time::Duration};
 
-use drive_bus::{Line, stats::Stats};
+use drive_bus::Line;
 use drive_fleet::{
     DriveHandle, Snapshot,
     alarms::{AlarmKind, LineSeen, Look, Moment},
@@ -64,7 +64,7 @@ impl Inner {
         let findings = line.findings();
         let is_heard = now.at.saturating_duration_since(self.alarms.began) >= HEARD_FOR;
         let seen = LineSeen {
-            away: away(&stats),
+            away: stats.port_away().map(str::to_owned),
             findings: (is_heard || !findings.is_empty()).then_some(&*findings),
         };
         let drives: Vec<&Snapshot> = drives.iter().map(|drive| &**drive).collect();
@@ -82,9 +82,4 @@ impl Inner {
             false => _ = self.alarms.wrong().remove(&kind),
         }
     }
-}
-
-/// Why a port is not there; `None`: it is.
-fn away(stats: &Stats) -> Option<String> {
-    (stats.opened <= stats.lost).then(|| stats.away.clone().unwrap_or_else(|| "it is opened".to_owned()))
 }

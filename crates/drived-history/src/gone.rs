@@ -1,0 +1,128 @@
+//! A run command of this side that went, as a fact: [`Gone`], with what became of the reference. It has no clock of its own.
+//!
+//! A drive that was switched off has lost both: its run command and its reference are 0 when its supply is there again. Who writes another
+//! run command leaves the reference as it was, unless he writes that too.
+
+use std::{fmt, time::Duration};
+
+use drive_core::{Frequency, Lack, Refusal, Verdict};
+use drive_fleet::Snapshot;
+use serde::Serialize;
+use tokio::time::Instant;
+
+/// What two readings of a drive show between which its run command went.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Went {
+    /// As the earlier reading showed it.
+    #[serde(rename = "reference_before_hz")]
+    reference_before: Frequency,
+    /// As the later one does.
+    #[serde(rename = "reference_hz")]
+    reference: Frequency,
+    /// How far they lie apart: in that time nobody here looked at it.
+    unread_ms: u64,
+}
+
+impl fmt::Display for Went {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { reference_before, reference, unread_ms } = self;
+        let apart = Duration::from_millis(*unread_ms).as_secs_f64();
+        write!(
+            f,
+            "its run command went between two readings that lie {apart:.1} s apart, and its reference "
+        )?;
+        match *reference {
+            Frequency::ZERO => write!(f, "with it: from {reference_before} to 0"),
+            stayed if stayed == *reference_before => write!(f, "stayed at {stayed}"),
+            now => write!(f, "went from {reference_before} to {now}"),
+        }
+    }
+}
+
+/// Follows the run command of one drive.
+#[derive(Debug, Default)]
+pub(crate) struct Gone {
+    /// When it was read last with a run command of this side, and its reference then.
+    ran: Option<(Instant, Frequency)>,
+}
+
+impl Gone {
+    /// Looks at what is known of the drive now; gives what is to be told, once for each run command that went.
+    pub(crate) fn look(&mut self, snapshot: &Snapshot) -> Option<Went> {
+        let status = snapshot.status.as_ref().filter(|_| !snapshot.retracted)?;
+        let reference = status.value.reference?;
+        let overridden = matches!(
+            status.value.verdict,
+            Some(Verdict::NotInForce { lacks: Lack::Command, because: Refusal::Overridden { .. } })
+        );
+        if overridden {
+            let is_earlier =
+                |(at, before): &(Instant, Frequency)| *at < status.at && *before != Frequency::ZERO;
+            let (at, before) = self.ran.take().filter(is_earlier)?;
+            let apart = status.at.saturating_duration_since(at);
+            let unread_ms = u64::try_from(apart.as_millis()).unwrap_or(u64::MAX);
+            return Some(Went { reference_before: before, reference, unread_ms });
+        }
+        self.ran = snapshot.started_here().then_some((status.at, reference));
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use drived_config::rights::{Caller, Rights};
+    use drived_plant::plant::{
+        commands::{Action, Request, Target},
+        testing::TestPlant,
+    };
+    use std::sync::Arc;
+
+    use drive_core::Direction;
+    use drive_fleet::Until;
+
+    use super::*;
+
+    #[tokio::test(start_paused = true)]
+    async fn a_run_command_that_went_is_told_once_with_what_became_of_its_reference() {
+        let test = TestPlant::of(1).await;
+        let hertz = Frequency::from_hertz;
+        let action = Action::Start {
+            direction: Direction::Forward,
+            setpoint: Some(hertz(30).into()),
+            until: Until::default(),
+        };
+        let target = Target::Drive("pump 1".to_owned());
+        let request =
+            Request { id: None, target, action, lifetime: Duration::from_secs(1), arrived: Instant::now() };
+        let caller = Caller::new("operator", "page", Rights::ALL);
+        let _ = test.plant.command(&caller, request, Duration::from_secs(10)).await;
+        let drive = test.plant.fleet().drive("pump 1").unwrap();
+        let running = drive.wait_until(Snapshot::started_here).await;
+        let shown = |after_ms: u64, output: Frequency, is_gone: bool| {
+            let mut seen = Snapshot::clone(&running);
+            let status = seen.status.as_mut().unwrap();
+            status.at += Duration::from_millis(after_ms);
+            let value = Arc::make_mut(&mut status.value);
+            value.reference = Some(output);
+            let because = Refusal::Overridden { by: "another word", remedy: "see" };
+            value.verdict =
+                Some(if is_gone { Verdict::lacks(Lack::Command, because) } else { Verdict::InForce });
+            seen
+        };
+        let told = |seen: [Snapshot; 3]| {
+            let mut gone = Gone::default();
+            seen.map(|seen| gone.look(&seen).map(|went| went.to_string()))
+        };
+        let powered =
+            [shown(0, hertz(30), false), shown(1_600, hertz(0), true), shown(2_000, hertz(0), true)];
+        let text = "its run command went between two readings that lie 1.6 s apart, and its reference with it: from 30.00 Hz to 0";
+        assert_eq!(told(powered), [None, Some(text.to_owned()), None]);
+        let stopped =
+            [shown(0, hertz(30), false), shown(500, hertz(30), false), shown(1_000, hertz(30), true)];
+        let text = "its run command went between two readings that lie 0.5 s apart, and its reference stayed at 30.00 Hz";
+        assert_eq!(told(stopped), [None, None, Some(text.to_owned())]);
+        // A reference of zero tells nothing: it was that before.
+        let slow = [shown(0, hertz(0), false), shown(500, hertz(0), true), shown(1_000, hertz(0), true)];
+        assert_eq!(told(slow), [None, None, None]);
+    }
+}
