@@ -122,7 +122,7 @@ impl<P: Port> ProfileDrive<P> {
         self.guarded.otherwise =
             all(&profile).find(fails).map(|guard| interned::text(&is_otherwise(guard, read(guard))));
         let guards = profile.file().who.guards.given().into_iter().flatten();
-        let failing = all(&profile).filter(|guard| fails(&guard)).count();
+        let failing = all(&profile).filter(|guard| fails(guard)).count();
         let mut unset = guards.map(crate::format::Spanned::get_ref).filter(fails);
         // A fingerprint that fails is no setting that anybody can make.
         self.guarded.setting = (unset.clone().count() == failing)
