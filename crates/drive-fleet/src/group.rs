@@ -294,7 +294,7 @@ impl Group {
 
     async fn started(&self, start: GroupStart, told: &Told<GroupStarted>) -> GroupStarted {
         let GroupStart { direction, setpoint, spacing, until } = start;
-        let asked = join_all(self.members.iter().map(|member| member.ask(setpoint))).await;
+        let asked = join_all(self.members.iter().map(|member| member.ask(direction, setpoint))).await;
         let (mut leaves, mut unready) = (Vec::new(), Vec::new());
         for (member, asked) in self.members.iter().zip(asked) {
             match asked {

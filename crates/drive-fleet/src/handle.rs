@@ -245,14 +245,19 @@ impl DriveHandle {
 
     /// Why a start at this setpoint, or at the one that the drive holds, would be refused now; `None` when it would be sent.
     pub async fn would_refuse(&self, setpoint: Option<Setpoint>) -> Option<Refused> {
-        self.ask(setpoint).await.err()
+        // No direction is judged before the drive is asked.
+        self.ask(Direction::Forward, setpoint).await.err()
     }
 
     /// The leave to start later, or why a start would be refused now.
-    pub(crate) async fn ask(&self, setpoint: Option<Setpoint>) -> Result<Leave, Refused> {
+    pub(crate) async fn ask(
+        &self,
+        direction: Direction,
+        setpoint: Option<Setpoint>,
+    ) -> Result<Leave, Refused> {
         let (reply, answer) = oneshot::channel();
         let name = Arc::clone(&self.act.commander);
-        self.post(Message::Ask { name, setpoint, reply })?;
+        self.post(Message::Ask { name, direction, setpoint, reply })?;
         answer.await.unwrap_or(Err(Refused::ShutDown))
     }
 

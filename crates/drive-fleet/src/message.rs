@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use drive_core::Setpoint;
+use drive_core::{Direction, Setpoint};
 use tokio::{
     sync::{oneshot, watch},
     time::Instant,
@@ -34,7 +34,12 @@ pub(crate) enum Message {
     /// A question.
     Question { id: CallId, question: Question, name: Arc<str>, reply: oneshot::Sender<Result<Told, Refused>> },
     /// The question whether a start would be sent now.
-    Ask { name: Arc<str>, setpoint: Option<Setpoint>, reply: oneshot::Sender<Result<Leave, Refused>> },
+    Ask {
+        name: Arc<str>,
+        direction: Direction,
+        setpoint: Option<Setpoint>,
+        reply: oneshot::Sender<Result<Leave, Refused>>,
+    },
 }
 
 /// What waits for nothing.

@@ -219,8 +219,8 @@ impl Desk {
                 self.supervisor.handle_question(id, &name, question);
                 false
             }
-            Message::Ask { name, setpoint, reply } => {
-                let _ = reply.send(self.supervisor.leave(now, &name, setpoint));
+            Message::Ask { name, direction, setpoint, reply } => {
+                let _ = reply.send(self.supervisor.leave(now, &name, direction, setpoint));
                 false
             }
         }

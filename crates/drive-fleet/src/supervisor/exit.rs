@@ -126,7 +126,7 @@ impl Supervisor {
     pub(super) fn advance_exit(&mut self, now: Instant) {
         if self.exit == Exit::Release {
             self.exit = Exit::Releasing;
-            self.enqueue(now, Asker::Policy(self.exits_by), Order::Release, None);
+            self.enqueue(now, Asker::Policy(self.exits_by), Order::Release, None, None);
         }
     }
 

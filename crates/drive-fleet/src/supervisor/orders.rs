@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use drive_core::{Error, StopMode};
+use drive_core::{Direction, Error, StopMode};
 use tokio::time::Instant;
 
 use super::{Asker, CallId, Job, Leave, Supervisor, permission::Blocked};
@@ -16,6 +16,8 @@ use crate::{
 pub(super) struct Queued {
     pub(super) asker: Asker,
     pub(super) order: Order,
+    /// The direction of the start that it prepares, of a group that has leave for one.
+    before: Option<Direction>,
     /// When it may not be sent any more.
     pub(super) expires: Instant,
 }
@@ -25,6 +27,8 @@ pub(super) struct Queued {
 pub(super) struct Active {
     pub(super) asker: Asker,
     pub(super) order: Order,
+    /// The direction of the start that it prepares, of a group that has leave for one.
+    pub(super) before: Option<Direction>,
     /// When its lifetime is over.
     expires: Instant,
     /// The setpoint of a start has been given.
@@ -90,7 +94,7 @@ impl Supervisor {
         if matches!(order, Order::Setpoint { .. }) {
             self.supersede_setpoints();
         }
-        self.enqueue(now, asker, order, expires);
+        self.enqueue(now, asker, order, leave.map(|leave| leave.direction), expires);
         // A poll gives way once; the next waits for its status, or a stream of orders would blind the fleet.
         let gives_way = self.in_flight.is_some_and(Job::is_poll) && !self.yielded;
         self.yielded |= gives_way;
@@ -160,13 +164,20 @@ impl Supervisor {
         }
     }
 
-    pub(super) fn enqueue(&mut self, now: Instant, asker: Asker, order: Order, expires: Option<Instant>) {
+    pub(super) fn enqueue(
+        &mut self,
+        now: Instant,
+        asker: Asker,
+        order: Order,
+        before: Option<Direction>,
+        expires: Option<Instant>,
+    ) {
         let expires = expires.unwrap_or(now + self.settings.times.lifetime);
-        self.queue.push_back(Queued { asker, order, expires });
+        self.queue.push_back(Queued { asker, order, before, expires });
     }
 
     pub(super) fn enqueue_reset(&mut self, now: Instant) {
-        self.enqueue(now, Asker::Policy(Policy::OnFault), Order::ResetFaults, None);
+        self.enqueue(now, Asker::Policy(Policy::OnFault), Order::ResetFaults, None, None);
     }
 
     /// Whether a start is on its way to the drive, or its outcome is looked for.
@@ -203,10 +214,11 @@ impl Supervisor {
                 self.conclude_order(active.asker, &active.order, outcome);
             }
             if self.active.is_none() {
-                let Queued { asker, order, expires } = self.queue.pop_front()?;
+                let Queued { asker, order, before, expires } = self.queue.pop_front()?;
                 self.active = Some(Active {
                     asker,
                     order,
+                    before,
                     expires,
                     setpoint_given: false,
                     armed: false,

@@ -46,6 +46,8 @@ impl From<Refusal> for Blocked {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Leave {
     stops: u64,
+    /// The direction of that start.
+    pub(super) direction: Direction,
 }
 
 impl Supervisor {
@@ -54,13 +56,15 @@ impl Supervisor {
         &self,
         now: Instant,
         name: &str,
+        direction: Direction,
         setpoint: Option<Setpoint>,
     ) -> Result<Leave, Refused> {
-        let order = Order::Start { direction: Direction::Forward, setpoint, until: Until::InForce };
+        let order = Order::Start { direction, setpoint, until: Until::InForce };
         match self.refuse_commander(Some(name), &order) {
             Some(refused) => Err(refused),
             None => {
-                self.allow(now, order, None).map(|_| Leave { stops: self.stops }).map_err(Blocked::reason)
+                let leave = Leave { stops: self.stops, direction };
+                self.allow(now, order, None).map(|_| leave).map_err(Blocked::reason)
             }
         }
     }
@@ -138,7 +142,7 @@ impl Supervisor {
                     self.allow_motion(now, status, active)?;
                 }
                 self.allow_setpoint(now, setpoint)?;
-                Some(Job::SetSetpoint(setpoint, None))
+                Some(Job::SetSetpoint(setpoint, active.and_then(|active| active.before)))
             }
             Order::Start { direction, setpoint, .. } => {
                 self.allow_motion(now, status, active)?;

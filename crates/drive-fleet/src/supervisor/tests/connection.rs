@@ -292,7 +292,7 @@ fn a_status_that_is_older_than_it_may_be_moves_nothing() {
     let rig = Rig::ready();
     let snapshot = rig.snapshot();
     let read = snapshot.status.as_ref().map(|status| status.at).unwrap();
-    let refused = |at| rig.machine.leave(at, "tester", None).err();
+    let refused = |at| rig.machine.leave(at, "tester", Direction::Forward, None).err();
     assert_eq!(refused(read + snapshot.max_age), None);
     assert_eq!(refused(read + snapshot.max_age + MS), Some(Refused::Stale));
 }
@@ -300,7 +300,7 @@ fn a_status_that_is_older_than_it_may_be_moves_nothing() {
 #[test]
 fn a_leave_to_start_is_gone_once_a_stop_has_been_asked_for() {
     let mut rig = Rig::ready();
-    let leave = rig.machine.leave(rig.now, "tester", None).unwrap();
+    let leave = rig.machine.leave(rig.now, "tester", Direction::Forward, None).unwrap();
     let asker = rig.asker();
     assert_eq!(rig.machine.refuse_at_once(&asker, &START, Some(leave)), None);
     rig.stop(StopMode::Ramp);
@@ -325,7 +325,7 @@ fn a_value_that_another_answer_withdraws_is_told_is_not_good_any_more_and_moves_
     rig.collect();
     assert_eq!(rig.events(), ["value withdrawn"], "it is told once");
     assert_eq!(freshness(&rig), Freshness::Stale);
-    let refused = rig.machine.leave(rig.now, "tester", None);
+    let refused = rig.machine.leave(rig.now, "tester", Direction::Forward, None);
     assert_eq!(refused, Err(Refused::Stale), "nothing rests on it");
     rig.pass(100 * MS);
     assert_eq!(freshness(&rig), Freshness::Fresh, "the next is asked for at once");

@@ -18,6 +18,18 @@ fn a_start_gives_the_setpoint_first_and_is_confirmed_at_the_reference() {
 }
 
 /// A drive from a file whose register of the setpoint does no more than read back.
+/// A drive that another runs, and that would refuse that start, keeps its speed: it is asked, and not only what was read of it.
+#[test]
+fn the_setpoint_of_a_group_that_starts_is_given_as_that_of_a_start_in_its_direction() {
+    let mut rig = Rig::ready();
+    let leave = rig.machine.leave(rig.now, "tester", Direction::Reverse, None).unwrap();
+    let (asker, setpoint) = (rig.asker(), Frequency::from_hertz(40).into());
+    let order = Order::Setpoint { setpoint, until: Until::InForce };
+    rig.machine.handle_order(rig.now, asker, order, Some(leave), None);
+    rig.pass(500 * MS);
+    assert_eq!(rig.drive.writes(), [Job::SetSetpoint(setpoint, Some(Direction::Reverse))]);
+}
+
 #[test]
 fn a_start_goes_on_behind_a_setpoint_that_only_a_start_shows_and_behind_no_other_that_is_not_confirmed() {
     let setpoint = Frequency::from_hertz(40).into();
