@@ -36,9 +36,10 @@ mod substance;
 #[cfg(feature = "schemars")]
 pub use format::schema;
 
-pub use check::{LONGEST, Refusal, Refusals, digest, read};
+pub use check::{LONGEST, Refusal, Refusals, read};
 pub use drive::{Owner, ProfileDrive};
 #[cfg(feature = "families")]
 pub use family::definition;
 pub use ladder::{Gap, Level};
 pub use profile::Profile;
+pub use substance::digest;

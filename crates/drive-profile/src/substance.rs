@@ -2,9 +2,8 @@
 
 use std::fmt::Write as _;
 
+use ring::digest::SHA256;
 use toml::{Table, Value};
-
-use crate::check::digest;
 
 /// Tables and keys that decide nothing: names, texts for people, and where a fact was read.
 const SAID: &[&str] =
@@ -16,6 +15,13 @@ pub(crate) fn of(text: &str) -> String {
     // A text that is none was refused before.
     table(&text.parse().unwrap_or_default(), &mut said);
     digest(&said)
+}
+
+/// The SHA-256 of a text, in hexadecimal digits: what its profile is known by.
+#[must_use]
+pub fn digest(text: &str) -> String {
+    let digest = ring::digest::digest(&SHA256, text.as_bytes());
+    digest.as_ref().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn table(of: &Table, said: &mut String) {

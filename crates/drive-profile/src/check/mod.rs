@@ -13,7 +13,6 @@ mod who;
 use std::{fmt, ops::Range};
 
 use crate::format::Spanned;
-use ring::digest::SHA256;
 
 use crate::{
     format::{File, Mark, Register, VERSION},
@@ -91,19 +90,12 @@ pub fn read(text: &str) -> Result<Profile, Refusals> {
     if refusals.is_empty() {
         let substance = substance::of(text);
         let (level, gaps) = ladder::climb(text, &file, &substance);
-        return Ok(Profile { file, level, gaps, digest: digest(text), substance });
+        return Ok(Profile { file, level, gaps, digest: substance::digest(text), substance });
     }
     refusals.sort_by_key(|refusal| refusal.line);
     refusals.dedup();
     refusals.truncate(TOLD);
     Err(Refusals(refusals))
-}
-
-/// The SHA-256 of a text, in hexadecimal digits: what its profile is known by.
-#[must_use]
-pub fn digest(text: &str) -> String {
-    let digest = ring::digest::digest(&SHA256, text.as_bytes());
-    digest.as_ref().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A file under check.

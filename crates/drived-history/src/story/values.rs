@@ -14,8 +14,13 @@ const BELONGS_MS: i64 = 1_000;
 /// A value is known for so long behind its reading.
 const HELD_MS: i64 = 3_000;
 
-/// When the drive was last seen without a fault, within a minute before a moment; where it had one all the time, when it was seen last.
-fn last_but_fault(connection: &Connection, facts: &Facts, at: i64) -> Result<Option<i64>, StoreError> {
+/// When the drive was last seen within a minute before a moment: behind a trip without a fault, unless it had one all the time.
+fn last_seen(
+    connection: &Connection,
+    facts: &Facts,
+    at: i64,
+    is_trip: bool,
+) -> Result<Option<i64>, StoreError> {
     let pieces = pieces(connection, &facts.drive, Quantity::STATE, at - 60_000, at)?;
     let (mut seen, mut seen_well) = (None, None);
     for piece in &pieces {
@@ -28,7 +33,7 @@ fn last_but_fault(connection: &Connection, facts: &Facts, at: i64) -> Result<Opt
             }
         }
     }
-    Ok(seen_well.or(seen))
+    Ok(seen_well.filter(|_| is_trip).or(seen))
 }
 
 /// How the drive was a moment before something happened.
@@ -50,7 +55,13 @@ pub(super) fn before(
     // The status that shows what happened was read at that moment; the one before it is asked for, or the last one before it was not seen.
     let gap = facts.gap_before(moment).map(|(start, _)| start);
     let at = gap.unwrap_or(moment - 1_000);
-    let (at, gap) = match last_but_fault(connection, facts, at)? {
+    // A fault that is read with a trip is the trip; one that stands when something else happens is how the drive was.
+    let is_trip = facts.records.iter().any(|found| {
+        found.what == "tripped"
+            && facts.is_of_drive(found)
+            && (found.time_unix_ms - moment).abs() <= BELONGS_MS
+    });
+    let (at, gap) = match last_seen(connection, facts, at, is_trip)? {
         Some(seen) if at - seen > HELD_MS => (seen, Some(seen)),
         Some(seen) => (seen.min(at), gap),
         None => (at, gap),

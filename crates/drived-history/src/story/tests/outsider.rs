@@ -159,6 +159,22 @@ fn how_a_drive_was_before_its_trip_is_not_told_by_the_trip() {
     assert!(story.before[0].text.starts_with("running, output 30.00 Hz"), "{:?}", story.before);
 }
 
+/// A reset at the panel, some seconds behind a trip.
+#[test]
+fn a_drive_that_was_in_fault_before_something_else_is_told_in_fault() {
+    let mut night = Written::begin("in-fault");
+    let mut tracker = Tracker::default();
+    for half in 500..660 {
+        let (state, output) = if half < 600 { (RUNNING, 3_000) } else { (FAULT, 0) };
+        let values = [(Quantity::STATE, state), (Quantity::OUTPUT_FREQUENCY, output)];
+        night.shown(Set::Status, tracker.see(half * 500, 3_000, &values).unwrap());
+    }
+    night.event(300_000, "tripped", "tripped: 3 OC3: overcurrent at constant speed", None);
+    night.event(309_000, "fault_cleared", "fault cleared", None);
+    let story = night.told(309_000);
+    assert!(story.before[0].text.starts_with("fault, output 0.00 Hz"), "{:?}", story.before);
+}
+
 #[test]
 fn how_a_drive_was_is_told_by_what_was_read_of_it_last_where_that_is_some_seconds_ago() {
     let mut night = Written::begin("before-silence");
