@@ -40,7 +40,8 @@ fn nothing_that_comes_from_outside_upsets_whoever_reads_it() {
 
 #[test]
 fn fuzzing_finds_what_is_planted() {
-    let told = fuzz::find_plants(1, 20_000);
+    // The rarest, an answer in ASCII whose LRC alone is wrong, comes at execution 34 541.
+    let told = fuzz::find_plants(2, 60_000);
     println!("{told}");
     assert_eq!(told.plants_found(), told.plants.len(), "{told}");
 }
