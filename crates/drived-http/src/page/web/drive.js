@@ -99,7 +99,8 @@ export function drive(root, name) {
     remark.hidden = !said;
     const unseen = shown.not_known ?? [];
     notKnown.hidden = !unseen.length;
-    const unseenNow = unseen.join('\n');
+    // As it is told: the French comes after the first values.
+    const unseenNow = unseen.map(told).join('\n');
     if (unseenNow !== unseenBefore) gaps.replaceChildren(...unseen.map(one => el('li', langOf(one), told(one))));
     unseenBefore = unseenNow;
     BIG.forEach(([, value, of], index) => {
