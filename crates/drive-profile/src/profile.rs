@@ -3,7 +3,7 @@
 use drive_core::Direction;
 
 use crate::{
-    format::{Action, Answer, FedBy, File, Guard, Register, Sign, Space, Step},
+    format::{Action, Answer, FedBy, File, Guard, Register, Sign, Space, Spanned, Step},
     ladder::{Gap, Level},
 };
 
@@ -106,7 +106,7 @@ impl Profile {
 
     /// Whether whatever is asked feeds its communication watchdog.
     pub(crate) fn is_fed_by_any_request(&self) -> bool {
-        let watchdog = self.file.watchdog.given().map(crate::format::Spanned::get_ref);
+        let watchdog = self.file.watchdog.given().map(Spanned::get_ref);
         watchdog.is_some_and(|watchdog| watchdog.fed_by == Answer::Given(FedBy::AnyRequest))
     }
 
@@ -116,7 +116,7 @@ impl Profile {
             Direction::Forward => &self.file.start.forward,
             Direction::Reverse => &self.file.start.reverse,
         };
-        start.given().map(crate::format::Spanned::get_ref)
+        start.given().map(Spanned::get_ref)
     }
 
     /// Whether anything that its drive reads to be tells it from others.
@@ -133,9 +133,23 @@ impl File {
         Some((register.space.unwrap_or(self.link.get_ref().space), address))
     }
 
+    /// The registers of what is measured, and of the present fault: what changes while the drive works.
+    pub(crate) fn measured(&self) -> [&Answer<Spanned<String>>; 7] {
+        let see = &self.see;
+        [
+            &see.output,
+            &see.setpoint,
+            &see.current,
+            &see.speed,
+            &see.output_voltage,
+            &see.dc_bus_voltage,
+            &self.faults.present,
+        ]
+    }
+
     /// A register by its name.
     pub(crate) fn named(&self, name: &str) -> Option<&Register> {
-        self.register.get(name).map(crate::format::Spanned::get_ref)
+        self.register.get(name).map(Spanned::get_ref)
     }
 
     /// What an action writes, in its order, register by register.

@@ -19,21 +19,11 @@ impl Check<'_> {
         let is_it =
             |other: &Spanned<String>| file.named(other.get_ref()).and_then(|of| file.place(of)) == place;
         let guards = file.who.guards.given().into_iter().flatten();
-        let see = &file.see;
-        let measured = [
-            &see.output,
-            &see.setpoint,
-            &see.current,
-            &see.speed,
-            &see.output_voltage,
-            &see.dc_bus_voltage,
-            &file.faults.present,
-        ];
         let why = if guards.into_iter().any(|of| is_it(&of.get_ref().register)) {
             format!("{name} is a guard as well: a setting tells no drive from another")
         } else if register.access != Access::Read {
             format!("{name} can be written: a setting tells no drive from another")
-        } else if measured.into_iter().filter_map(Answer::given).any(is_it) {
+        } else if file.measured().into_iter().filter_map(Answer::given).any(is_it) {
             format!("{name} changes while the drive works: it tells no drive from another")
         } else if let Some(state) = self.denied_state(guard) {
             format!("{name} does not read so while it is {state}: it tells no drive from another")

@@ -25,15 +25,7 @@ impl Check<'_> {
             );
         }
         let see = &file.see;
-        for seen in [
-            &see.output,
-            &see.setpoint,
-            &see.current,
-            &see.speed,
-            &see.output_voltage,
-            &see.dc_bus_voltage,
-            &file.faults.present,
-        ] {
+        for seen in file.measured() {
             if let Some(name) = seen.given() {
                 self.readable(name);
             }
