@@ -40,8 +40,11 @@ def main(url):
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"], timeout=PATIENCE_MS)
 
-        def opened(context, view, locale="en-GB"):
+        def opened(context, view, locale="en-GB", late=None):
             page = browser.new_context(locale=locale, **context).new_page()
+            # The French of the daemon's sentences comes when it is let.
+            if late is not None:
+                page.route("**/sentences_fr.js*", lambda asked: late.append(asked))
             page.set_default_timeout(PATIENCE_MS)
             page.on("pageerror", lambda error: complaints.append(str(error)))
             page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
@@ -63,8 +66,12 @@ def main(url):
                 case ["unseen", name]:
                     said = {}
                     for locale in ("en-GB", "fr-FR"):
-                        page = opened(DESK, f"#/drive/{name}", locale)
+                        late = []
+                        page = opened(DESK, f"#/drive/{name}", locale, late)
                         expect(page.locator("details.panel:not([hidden]) li").first).to_be_attached(timeout=PATIENCE_MS)
+                        for asked in late:
+                            asked.continue_()
+                        expect(page.locator("details.panel li[lang]")).to_have_count(0, timeout=PATIENCE_MS)
                         page.locator(".wide-panel details").last.locator("summary").click()
                         expect(page.locator(".wide-panel details[open] tbody th").first).to_be_visible(timeout=PATIENCE_MS)
                         said[locale[:2]] = {"unseen": page.evaluate(UNSEEN), "registers": page.evaluate(REGISTERS)}
