@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use drive_bus::Line;
+use drive_bus::{Line, LineConfig};
+use drive_core::serial::SerialSettings;
 
 use crate::{
     Error,
@@ -41,7 +42,8 @@ pub(crate) fn measure(report: &mut Report, time: Duration) -> Result<(), Error> 
     let (without, with) = runtime()?.block_on(async {
         let mut measurements = Vec::new();
         for (config, slaves) in rig.configs().zip([living.clone(), all]) {
-            let line = Line::open(config).await?;
+            let offline_after = LineConfig::serial("", SerialSettings::MODBUS_DEFAULT).offline_after;
+            let line = Line::open(LineConfig { offline_after, ..config }).await?;
             measurements.push(tokio::spawn(async move {
                 let mean = sweeps(&line, &slaves, &DEAD, SETTLE, time).await;
                 line.close().await;

@@ -23,7 +23,7 @@ use crate::{
 const SETTINGS: SerialSettings = SerialSettings::MODBUS_DEFAULT;
 
 /// So many answers of a drive may be missed: its simulator is a program too, which a busy machine keeps waiting. More are a fault.
-const MISSED: u32 = 3;
+const MISSED: u32 = 30;
 
 /// The one request of all measurements.
 pub(crate) const READ: Request<'static> = Request::ReadHoldingRegisters(FIRST, QUANTITY);

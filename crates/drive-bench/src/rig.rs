@@ -69,6 +69,8 @@ impl Rig {
         self.ports.iter().map(|port| LineConfig {
             // Nothing echoes here, and the first write of a Stop must not be preceded by a read.
             echo: Echo::Off,
+            // All its drives live: a busy machine keeps their simulator waiting, and that is all a silence tells here.
+            offline_after: 0,
             unpaced: self.unpaced,
             ..LineConfig::serial(port, SerialSettings::MODBUS_DEFAULT)
         })
