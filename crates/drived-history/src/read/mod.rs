@@ -185,7 +185,8 @@ pub fn told_in(
             all.push((segment, piece_of(quantity, start, end, &data)?));
         }
         if quantity.is_kept_by_changes() {
-            let until = oldest_block(connection, source, quantity)?.unwrap_or(i64::MAX);
+            // What a block begins with is in it.
+            let until = oldest_block(connection, source, quantity)?.map_or(i64::MAX, |oldest| oldest - 1);
             all.extend(changes(connection, source, quantity, from, to.min(until))?);
         }
     }

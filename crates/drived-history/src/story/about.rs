@@ -52,8 +52,8 @@ const HEAVY: usize = 12;
 /// What is asked for: a moment, or the minute that begins with it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Asked {
-    from: i64,
-    to: i64,
+    pub(super) from: i64,
+    pub(super) to: i64,
 }
 
 impl Asked {
@@ -63,18 +63,18 @@ impl Asked {
     }
 
     /// How far away something is.
-    fn distance(self, at: i64) -> i64 {
+    pub(super) fn distance(self, at: i64) -> i64 {
         (self.from - at).max(at - self.to).max(0)
     }
 
     /// Whether it is what was meant, as exactly as a clock is read and a drive is polled.
-    fn is_met_by(self, at: i64) -> bool {
+    pub(super) fn is_met_by(self, at: i64) -> bool {
         (self.from - CLOCK_MS..=self.to + SHOWN_MS).contains(&at)
     }
 }
 
 /// How much something weighs; `None`: no story is about it.
-fn weight(found: &RecordView) -> Option<usize> {
+fn weight(facts: &Facts, found: &RecordView) -> Option<usize> {
     let of = |what: &str| WEIGHT.iter().position(|one| *one == what);
     let is_run = || {
         let body = body(found);
@@ -85,6 +85,7 @@ fn weight(found: &RecordView) -> Option<usize> {
         ends || begins && !matches!(body.cause, Some(Cause::Command { .. }))
     };
     match &*found.what {
+        "control_taken" if facts.is_fallen_back(found) => of("control_returned"),
         "state_changed" if is_run() => of("run"),
         what => of(what),
     }
@@ -94,7 +95,11 @@ fn weight(found: &RecordView) -> Option<usize> {
 fn told_of(facts: &Facts) -> impl Iterator<Item = (usize, i64, &RecordView)> {
     let is_one =
         |found: &&RecordView| matches!(&*found.kind, "event" | "command") && facts.is_of_drive(found);
-    facts.records.iter().filter(is_one).filter_map(|found| Some((weight(found)?, begins(found), found)))
+    facts
+        .records
+        .iter()
+        .filter(is_one)
+        .filter_map(|found| Some((weight(facts, found)?, begins(found), found)))
 }
 
 /// What somebody means who asks for this moment: the weightiest of what was then; else what is nearest, within seconds; else what was found
@@ -113,7 +118,8 @@ pub(super) fn about(facts: &Facts, asked: Asked) -> Option<&RecordView> {
         told_of(facts)
             .filter(|(weight, begins, found)| {
                 *weight <= HEAVY + 1
-                    && (*begins >= asked.from || found.what == "lost")
+                    // What a drive was lost by lasts, and so does that another one answers in its place.
+                    && (*begins >= asked.from || matches!(&*found.what, "lost" | "other_family"))
                     && (start - CLOCK_MS..=end + SHOWN_MS).contains(begins)
             })
             .min_by_key(|(weight, _, found)| (*weight, found.number))
@@ -136,7 +142,7 @@ pub(super) fn beside(
     moment: i64,
     told: &[Sentence],
 ) -> Vec<Sentence> {
-    let known = about.and_then(weight);
+    let known = about.and_then(|about| weight(facts, about));
     let is_told = |weight: usize, begins: i64| match known {
         Some(known) => weight < known.min(HEAVY) && (begins - moment).abs() <= BESIDE_MS,
         None => true,

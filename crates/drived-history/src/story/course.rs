@@ -122,7 +122,7 @@ fn sentence(facts: &Facts, found: &RecordView, with_words: bool) -> Sentence {
     let asked = if found.kind == "command" { "asked: " } else { "" };
     let text = match found.text.strip_prefix("returned: ") {
         Some(alarm) if found.kind == "alarm" => format!("over: {alarm}"),
-        _ => found.text.clone(),
+        _ => facts.told(found),
     };
     // A line on which nothing is heard is opened anew: that its port was away nobody has seen.
     let text = match text.split_once("nothing was heard for ") {

@@ -12,7 +12,7 @@ mod facts;
 mod tests;
 mod values;
 
-use drived_plant::plant::past::{Certainty, SentenceView as Sentence, StoryView as Story};
+use drived_plant::plant::past::{Certainty, RecordView, SentenceView as Sentence, StoryView as Story};
 use rusqlite::Connection;
 
 pub use self::facts::AFTER_MS as LOOKED_AFTER_MS;
@@ -29,16 +29,18 @@ use crate::store::StoreError;
 /// # Errors
 /// The file cannot be read.
 pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, StoreError> {
-    let facts = Facts::gather(connection, drive, at)?;
-    let about = about(&facts, Asked::of(at));
+    let (facts, asked) = (Facts::gather(connection, drive, at)?, Asked::of(at));
+    let about = about(&facts, asked);
     let moment = about.map_or(at, |found| found.time_unix_ms);
-    let moved = match about {
-        Some(about) if about.what != "limit" => Vec::new(),
-        _ => moved(connection, &facts, at)?,
+    let movement = match about {
+        Some(about) if about.what != "limit" => None,
+        _ => Some(moved(connection, &facts, asked)?),
     };
+    let has_moved = movement.as_ref().is_some_and(|movement| movement.is_of(asked));
+    let moved = movement.map(|movement| movement.told(asked)).unwrap_or_default();
     let mut why = match about {
         Some(about) => cause::causes(&facts, about),
-        None => cause::of_nothing(&facts, at, !moved.is_empty()),
+        None => cause::of_nothing(&facts, at, has_moved),
     };
     let settings = settings(connection, drive, moment - BEFORE_MS, moment + AFTER_MS)?;
     if about.is_some_and(|about| about.what == "tripped") {
@@ -47,17 +49,27 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
     }
     let headline = match about {
         Some(found) => Some(Sentence::of(Certainty::Seen, facts.in_words(found)).at(found.time_unix_ms)),
-        None => moved.first().cloned(),
+        None => moved.first().filter(|_| has_moved).cloned(),
     };
     why.extend(moved);
     let beside = beside(&facts, about, moment, &why);
     why.extend(beside);
+    // How it was before what is told is how it was before its output began to fall.
+    let fall = about.filter(|about| shows_late(about)).and_then(|_| facts.fall_before(moment));
     Ok(Story {
         drive: drive.to_owned(),
         about: headline,
         why,
-        before: before(connection, &facts, moment)?,
+        before: before(connection, &facts, fall.map_or(moment, |fall| fall.since))?,
         course: with_settings(course(&facts, moment), settings),
         not_known: not_known(&facts, moment, about.is_some()),
     })
+}
+
+/// Whether a drive may show something only when its motor has been ramping down for a while.
+fn shows_late(about: &RecordView) -> bool {
+    matches!(
+        &*about.what,
+        "command_overridden" | "reference_taken" | "output_blocked" | "control_taken" | "state_changed"
+    )
 }

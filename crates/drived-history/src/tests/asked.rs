@@ -204,3 +204,26 @@ fn a_drive_of_which_no_value_is_written_yet_is_there_by_what_happened_to_it() {
     archive.write_records(&mut store.connection, moment(6_500)).unwrap();
     assert_eq!(crate::read::drives(&store.connection).unwrap(), ["pump"]);
 }
+
+/// A drive that ran four seconds behind the beginning, in a time that ended when the clock was set: asked from before that beginning.
+#[test]
+fn what_is_asked_of_a_time_that_begins_before_the_first_value_does_not_end_with_that_value() {
+    let folder = Folder::new("history-before-first");
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    let (mut archive, mut pump) = (Archive::begin(moment(0)), Pump::of("a"));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    for second in 0..28 {
+        let state = if second < 4 { 1 } else { 3 };
+        pump.read(&mut archive, moment(second * 1_000), &[(Quantity::STATE, state)]);
+    }
+    archive.end_run(&mut store.connection, moment(28_000)).unwrap();
+    while tidy::compact(&mut store.connection, i64::MAX / 2).unwrap() {}
+    let (from, to) = (BEGIN_MS - MINUTE_MS, BEGIN_MS + 20_000);
+    let pieces = crate::read::pieces(&store.connection, "a", Quantity::STATE, from, to).unwrap();
+    let points: Vec<_> = pieces
+        .iter()
+        .flat_map(|piece| &piece.points)
+        .map(|point| (point.at - BEGIN_MS, point.count))
+        .collect();
+    assert_eq!(points, [(0, Some(1)), (4_000, Some(3))]);
+}

@@ -8,7 +8,7 @@ use drived_plant::plant::past::{
 use super::{
     super::{
         body::body,
-        facts::{Facts, begins, lasting},
+        facts::{Facts, begins, is_silent, lasting},
     },
     evidence::{is_of_supply, loss_before},
     word::{Went, how_it_went},
@@ -49,7 +49,10 @@ impl Back {
         let heard = connected.map(|connected| {
             let shown = connected.text.strip_prefix("connected: ").unwrap_or(&connected.text);
             let after = lasting(connected.time_unix_ms - begins(lost));
-            let text = format!("it was heard again {after} after it was heard last: {shown}");
+            let text = match is_silent(lost) {
+                true => format!("it was heard again {after} after it was heard last: {shown}"),
+                false => format!("its status was read again {after} after it was read last: {shown}"),
+            };
             Sentence::of(Seen, text).at(connected.time_unix_ms)
         });
         let another = connected.and_then(|back| another(facts, back)).map(Shows::Another);

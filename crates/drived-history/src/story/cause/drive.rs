@@ -10,7 +10,7 @@ use drived_plant::plant::past::{
 use super::{
     super::{
         body::{Cause, body},
-        facts::{Facts, begins},
+        facts::{Facts, begins, lasting},
     },
     back::SILENT_TOGETHER_MS,
     evidence::{
@@ -37,7 +37,8 @@ pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, op
     all.extend(of_reference(facts, about).filter(|_| has_gone));
     all.extend(lost_before(facts, about.time_unix_ms));
     all.extend(by_word);
-    all.extend(acted_upon(facts, about));
+    all.extend(falling(facts, about).filter(|_| has_gone));
+    all.extend(acted_upon(facts, about).or_else(|| withdrew(facts, about)));
     all.extend(seen_beside(facts, about.time_unix_ms));
     if about.what == "output_blocked" {
         all.extend(of_low_speed(facts, about));
@@ -88,6 +89,33 @@ fn acted_upon(facts: &Facts, about: &RecordView) -> Option<Sentence> {
     let ended = own.find(|found| found.what == "state_changed")?;
     let text = format!("upon this, this program ended the run by itself, by its policy: {}", ended.text);
     Some(Sentence::of(Seen, text).at(ended.time_unix_ms))
+}
+
+/// Likewise where its output was falling already.
+fn withdrew(facts: &Facts, about: &RecordView) -> Option<Sentence> {
+    let own = facts.records.iter().filter(|found| {
+        found.drive == about.drive
+            && (0..=BESIDE_MS / 6).contains(&(found.time_unix_ms - about.time_unix_ms))
+            && found.number >= about.number
+    });
+    let (ended, upon) = own.filter_map(|ended| Some((ended, facts.was_ending(ended)?))).next()?;
+    let text = format!(
+        "upon this, this program withdrew its run command by itself: {}; its output was falling by then: whether that or what had begun before it ended the run is not known",
+        facts.told(upon)
+    );
+    Some(Sentence::of(NotKnown, text).at(ended.time_unix_ms))
+}
+
+/// That its output was falling before its run command was seen to have gone.
+fn falling(facts: &Facts, about: &RecordView) -> Option<Sentence> {
+    let at = about.time_unix_ms;
+    let fall = facts.fall_before(at)?;
+    let text = format!(
+        "its output had been falling from {} Hz for {} when that was seen",
+        fall.from(),
+        lasting(at - fall.since)
+    );
+    Some(Sentence::of(Seen, text).at(fall.since))
 }
 
 /// What the drive showed before it came to stand, where that had been done at the drive.
@@ -178,6 +206,7 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                 said.push(Sentence::of(NotKnown, "who pressed it cannot be seen from the line"));
                 return said;
             }
+            said.extend(withdrew(facts, about));
             let shown = shown_before(facts, about).filter(|_| !begins_to_run);
             if let Some(shown) = shown {
                 let text =

@@ -7,7 +7,7 @@ use drived_plant::plant::past::{
 
 use super::super::{
     body::body,
-    facts::{Facts, SEEN_AGAIN_MS, begins, lasting},
+    facts::{Facts, SEEN_AGAIN_MS, begins, is_silent, lasting},
 };
 
 /// What comes within this time of each other may have one cause.
@@ -106,8 +106,9 @@ pub(super) fn found_within(facts: &Facts, at: i64, what: &str) -> Sentence {
 /// That it had not answered until it was seen again.
 pub(super) fn lost_before(facts: &Facts, at: i64) -> Option<Sentence> {
     let (lost, end) = loss_before(facts, at)?;
-    let text =
-        format!("nothing had been heard of it before, for {}: {}", lasting(end - begins(lost)), lost.text);
+    let nothing =
+        if is_silent(lost) { "nothing had been heard of it" } else { "its status had not been read" };
+    let text = format!("{nothing} before, for {}: {}", lasting(end - begins(lost)), lost.text);
     Some(Sentence::of(Seen, text).at(lost.time_unix_ms))
 }
 

@@ -55,6 +55,12 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         "tripped" => of_trip(facts, about),
         "lost" => of_loss(facts, about),
         "state_changed" | "fault_cleared" => of_change(facts, about),
+        "control_taken" if facts.is_fallen_back(about) => at_the_drive(
+            facts,
+            about,
+            Sentence::of(Said, format!("the drive says so: {}", facts.told(about))),
+            "whether who had it before has given up, or somebody wrote that it should, or a reset emptied what it was by, cannot be seen from the line",
+        ),
         "control_taken" => at_the_drive(
             facts,
             about,
@@ -71,8 +77,13 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         "output_blocked" | "reference_taken" | "command_overridden" | "run_not_adopted" => at_the_drive(
             facts,
             about,
-            Sentence::of(Said, format!("the drive's own words show it: {}", about.text)),
-            "who or what did it at the drive cannot be seen from the line",
+            Sentence::of(Said, format!("the drive's own words show it: {}", facts.told(about))),
+            match facts.control_at(about.time_unix_ms + 1) {
+                Some(control) if control != "bus" => {
+                    "whether another master, an input or a key did it cannot be seen from the line"
+                }
+                _ => "who or what did it at the drive cannot be seen from the line",
+            },
         ),
         "stop_unconfirmed" => of_unconfirmed_stop(facts, about),
         "output_departed" => of_departure(facts, about),

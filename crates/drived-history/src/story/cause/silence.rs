@@ -8,7 +8,7 @@ use drived_plant::plant::past::{
 use super::{
     super::{
         body::body,
-        facts::{Facts, begins, lasting},
+        facts::{Facts, begins, is_silent, lasting},
     },
     back::{Back, SILENT_TOGETHER_MS, Shows},
     evidence::{BESIDE_MS, SILENT_MS, TOGETHER_MS, names},
@@ -25,8 +25,18 @@ pub(super) fn of_silence(facts: &Facts, at: i64) -> Vec<Sentence> {
     match own {
         Some(lost) => {
             let mut said = vec![
-                Sentence::of(Seen, format!("nothing had been heard of it before: {}", lost.text))
-                    .at(lost.time_unix_ms),
+                Sentence::of(
+                    Seen,
+                    format!(
+                        "{} before: {}",
+                        match is_silent(lost) {
+                            true => "nothing had been heard of it",
+                            false => "its status had not been read",
+                        },
+                        lost.text
+                    ),
+                )
+                .at(lost.time_unix_ms),
             ];
             said.extend(of_loss(facts, lost));
             said
@@ -56,10 +66,13 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             && body_of_alarm(found).is_some_and(|alarm| alarm.is_port_away())
     });
     if let Some(away) = away {
-        return vec![
+        let mut said = vec![
             Sentence::of(Seen, format!("the port of the line was away: {}", away.text)).at(away.time_unix_ms),
-            Sentence::of(NotKnown, "who unplugged it, or what broke, the program cannot see"),
         ];
+        said.extend(port_is_back(facts, away, begins(about)));
+        said.push(Sentence::of(NotKnown, "who unplugged it, or what broke, the program cannot see"));
+        said.extend(Back::behind(facts, about).told());
+        return said;
     }
     let began = begins(about);
     let back = Back::behind(facts, about);
@@ -125,6 +138,20 @@ pub(super) fn of_loss(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     }
 }
 
+/// That a port which was away was there again: a drive of its line was heard.
+fn port_is_back(facts: &Facts, away: &RecordView, since: i64) -> Option<Sentence> {
+    let mut later =
+        facts.records.iter().filter(|found| found.number > away.number && found.line == facts.line);
+    let heard =
+        later.find(|found| matches!(&*found.what, "connected" | "other_family" | "identity_changed"))?;
+    let after = lasting(heard.time_unix_ms - since);
+    let text = format!(
+        "it was there again {after} after that drive was read last: {} was heard",
+        heard.drive.as_deref()?
+    );
+    Some(Sentence::of(Seen, text).at(heard.time_unix_ms))
+}
+
 /// What is told of a drive of which nothing that could be used was heard, because what it answered was damaged.
 fn damaged(facts: &Facts, about: &RecordView) -> Option<Vec<Sentence>> {
     let words = ["was damaged", "does not fit the request"];
@@ -156,7 +183,7 @@ fn alone(facts: &Facts, back: Back) -> Vec<Sentence> {
         // A drive to which nothing happened has no record: that nobody else is there is not known.
         true => "nothing is recorded of another drive of its line around then".to_owned(),
         false => format!(
-            "no other drive of its line is recorded as lost within {} s of it",
+            "no other drive of its line is recorded as fallen silent within {} s of it",
             SILENT_TOGETHER_MS / 1_000
         ),
     };

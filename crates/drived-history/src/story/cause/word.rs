@@ -56,7 +56,7 @@ pub(super) fn how_it_went(facts: &Facts, gone: &RecordView) -> Went {
 
 /// What was seen of its reference.
 pub(super) fn of_reference(facts: &Facts, gone: &RecordView) -> Option<Sentence> {
-    found(facts, gone).map(|found| Sentence::of(Seen, found.text.clone()).at(found.time_unix_ms))
+    found(facts, gone).map(|found| Sentence::of(Seen, facts.told(found)).at(found.time_unix_ms))
 }
 
 fn found<'a>(facts: &'a Facts, gone: &RecordView) -> Option<&'a RecordView> {

@@ -51,7 +51,7 @@ impl Facts {
             "state_changed" => ends_run || acted(),
             _ => true,
         };
-        if can { cause } else { Some(Cause::Drive) }
+        if can && self.was_ending(found).is_none() { cause } else { Some(Cause::Drive) }
     }
 
     /// The trip by which the output of a drive was off when its stop was confirmed: the stop did not bring it to a standstill.
@@ -79,19 +79,27 @@ impl Facts {
     pub(in crate::story) fn in_words(&self, found: &RecordView) -> String {
         let explained =
             self.explained(found).map(|explained| explained.text.replacen("trip explained", "tripped", 1));
-        explained.unwrap_or_else(|| found.text.clone())
+        explained.unwrap_or_else(|| self.told(found))
     }
 
-    /// Events of this name at other drives, not farther from a moment than this.
+    /// Events of this name at other drives, not farther from a moment than this. One that answers, if not as it should, is lost and not silent.
     pub(in crate::story) fn elsewhere(&self, what: &str, at: i64, within: i64) -> Vec<&RecordView> {
         let is_one = |found: &&RecordView| {
             found.kind == "event"
                 && found.what == what
+                && is_silent(found)
                 && found.drive.as_deref().is_some_and(|drive| drive != self.drive)
                 && (found.time_unix_ms - at).abs() <= within
         };
         self.records.iter().filter(is_one).collect()
     }
+}
+
+/// Whether nothing was heard of a drive that is told as lost: one that answers by exceptions, or damaged, is not cut off.
+pub(in crate::story) fn is_silent(found: &RecordView) -> bool {
+    const ANSWERED: [&str; 4] =
+        [": exception ", "was damaged", "does not fit the request", "expired before it was sent"];
+    found.what != "lost" || !ANSWERED.iter().any(|words| found.text.contains(words))
 }
 
 /// When something began: a loss with the silence, and not when patience was over.

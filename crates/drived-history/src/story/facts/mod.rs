@@ -1,7 +1,9 @@
 //! What the file holds of a drive around a moment.
 
+mod fall;
 mod found;
 mod known;
+mod words;
 
 use std::collections::BTreeSet;
 
@@ -9,9 +11,13 @@ use drived_plant::plant::past::{LineMinuteView, RecordView};
 use rusqlite::Connection;
 
 use self::known::{gaps, heard, known_spans};
-pub(super) use self::{found::begins, known::lasting};
+pub(super) use self::{
+    found::{begins, is_silent},
+    known::lasting,
+};
 use super::body::body;
 use crate::{
+    curve::Piece,
     quantity::Quantity,
     read::{Filter, Found, bounds, line_minutes, pieces, records},
     store::StoreError,
@@ -43,6 +49,8 @@ pub(super) struct Facts {
     pub(super) inputs: Vec<(i64, i64)>,
     /// and when anything is known of them.
     pub(super) inputs_known: Vec<(i64, i64)>,
+    /// Its output, from each of these moments on.
+    outputs: Vec<(i64, Option<i64>)>,
     /// By what it was commanded, from each of these moments on.
     pub(super) controls: Vec<(i64, String)>,
     /// When other drives of its line were heard.
@@ -94,6 +102,11 @@ impl Facts {
         let points = read.iter().flat_map(|piece| &piece.points);
         let inputs = points.filter_map(|point| Some((point.at, point.count?))).collect();
         let inputs_known = read.into_iter().flat_map(|piece| known_spans(&piece.closed())).collect();
+        let outputs = pieces(connection, drive, Quantity::OUTPUT_FREQUENCY, from, to)?
+            .into_iter()
+            .flat_map(Piece::closed)
+            .map(|point| (point.at, point.count))
+            .collect();
         let minutes = line_minutes(connection, from, to, RECORDS)?
             .into_iter()
             .filter(|minute| Some(&minute.line) == line.as_ref())
@@ -116,6 +129,7 @@ impl Facts {
             gaps,
             inputs,
             inputs_known,
+            outputs,
             controls,
             heard: Vec::new(),
             minutes,

@@ -2,6 +2,7 @@
 //! here by what was staged; that it says nothing else for certain is looked at too.
 
 mod causes;
+mod certain;
 mod nights;
 mod outsider;
 mod returns;

@@ -38,7 +38,7 @@ async fn one_silent_drive_is_told_as_that_and_its_neighbours_speak_for_the_line(
     let story = night.asked("one", "pump 1", at).await;
     assert!(story.about.as_ref().unwrap().text.starts_with("lost"), "{story:?}");
     let seen = story.why(Certainty::Seen);
-    assert!(seen.contains("no other drive of its line is recorded as lost within"), "{story:?}");
+    assert!(seen.contains("no other drive of its line is recorded as fallen silent within"), "{story:?}");
     assert!(story.why(Certainty::NotKnown).contains("its supply"), "{story:?}");
     assert_eq!(story.why(Certainty::Likely), "");
 }

@@ -204,7 +204,11 @@ fn whoever_asks_at_once_is_told_what_may_not_be_there_yet() {
         let open: Vec<&str> = story.not_known.iter().map(|one| &*one.text).collect();
         assert_eq!(open.iter().any(|text| text.contains("may not be there yet")), is_fresh, "{open:?}");
         let seen = story.why(Certainty::Seen);
-        assert_eq!(seen.contains("no other drive of its line is recorded as lost"), !is_fresh, "{story:?}");
+        assert_eq!(
+            seen.contains("no other drive of its line is recorded as fallen silent"),
+            !is_fresh,
+            "{story:?}"
+        );
     }
 }
 
