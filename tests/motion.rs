@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use drive_core::{Direction, Drive, ErrorKind, Frequency, SlaveAddress, StopMode};
+use drive_core::{Direction, Drive, Error, ErrorKind, Frequency, SlaveAddress, Status, StopMode};
 use drive_families::Family;
 use drive_testing::{
     bench,
@@ -90,6 +90,112 @@ async fn a_start_that_fails_behind_its_run_command_is_unknown_and_one_that_fails
             assert!(unknown > 0, "{family}");
         }
     }
+}
+
+/// A start at a setpoint, as a fleet gives it: whoever would refuse it is not given its setpoint.
+async fn start_at(rig: &mut Rig, direction: Direction, hertz: u16) -> Result<Status, Error> {
+    let setpoint = Frequency::from_hertz(hertz).into();
+    rig.drive.may_start(direction, Some(setpoint)).await?;
+    rig.drive.set_setpoint(setpoint).await?;
+    rig.drive.start(direction).await
+}
+
+/// The register of the setpoint.
+fn setpoint_register(family: Family) -> u16 {
+    match drives::five(family) {
+        drives::Five::Atv21 => 0xFA01,
+        drives::Five::Atv28 | drives::Five::Atv58 => 401,
+        drives::Five::Atv312 => 8502,
+        drives::Five::Omron3g3ev => 0x0002,
+    }
+}
+
+/// What stands in the way of a start, as lines of the simulator's text, and the direction of that start. In all but the trips a motor
+/// runs, at 20 Hz, by somebody else.
+const REFUSED: &[(Family, Direction, &[&str])] = &[
+    // §6.2 p. 12: the terminals command, the bus gives the reference.
+    (Family::ATV21, Direction::Forward, &["set CMOD 0", "set FMOD 4", "master FA01 2000", "terminal F on"]),
+    (Family::ATV21, Direction::Forward, &["trip 000Eh"]),
+    // A reference of another master, the other way round.
+    (
+        Family::ATV28,
+        Direction::Forward,
+        &["master LFr -20", "master CMD 0006h", "master CMD 0007h", "master CMD 000Fh"],
+    ),
+    (Family::ATV28, Direction::Forward, &["trip 17"]),
+    (
+        Family::ATV58,
+        Direction::Forward,
+        &["master W401 FF38h", "master CMD 0006h", "master CMD 0007h", "master CMD 000Fh"],
+    ),
+    (Family::ATV58, Direction::Forward, &["trip 2"]),
+    // BBV51701 p. 14, 15: the command channel is the terminals, the reference channel is Modbus.
+    (Family::ATV312, Direction::Forward, &["set Cd1 1", "master LFr 20", "terminal LI1 on"]),
+    (
+        Family::ATV312,
+        Direction::Forward,
+        &["master LFr -20", "master CMD 0006h", "master CMD 0007h", "master CMD 000Fh"],
+    ),
+    (Family::ATV312, Direction::Forward, &["trip 17"]),
+    // §2.1: n02 = 4 takes commands from the terminals and the reference from the bus; n05 = 1 forbids reverse.
+    (
+        Family::OMRON_3G3EV,
+        Direction::Forward,
+        &["set n02 4", "power cycle", "master 0002h 200", "terminal SF on"],
+    ),
+    (Family::OMRON_3G3EV, Direction::Reverse, &["set n05 1", "master 0002h 200", "master 0001h 1"]),
+    (Family::OMRON_3G3EV, Direction::Forward, &["trip 9"]),
+];
+
+#[tokio::test(start_paused = true)]
+async fn a_start_that_is_refused_changes_neither_the_setpoint_nor_the_speed_of_a_motor_that_runs() {
+    for (family, direction, deeds) in REFUSED {
+        let mut rig = contract(*family).rig();
+        rig.drive.status().await.expect("it answers");
+        for deed in *deeds {
+            let told = rig.simulated.control(&format!("{} {deed}", rig.machine.name()));
+            told.unwrap_or_else(|error| panic!("{family}: {deed}: {error}"));
+        }
+        // It is polled, so that no watchdog trips.
+        runs(&mut rig).await;
+        let given = |rig: &Rig| bench::written(&rig.machine, setpoint_register(*family));
+        let (before, setpoints) = (rig.machine.observe(), given(&rig));
+        let is_tripped = deeds.iter().any(|deed| deed.starts_with("trip"));
+        let turns = if is_tripped { 0 } else { 2_000 };
+        assert_eq!(before.output_frequency.abs(), turns, "{family}: {deeds:?}");
+        let refused = start_at(&mut rig, *direction, 40).await.expect_err("it would not come into force");
+        assert_eq!(refused.kind(), ErrorKind::Refused, "{family}: {deeds:?}: {refused}");
+        assert_eq!(given(&rig), setpoints, "{family}: {deeds:?}");
+        runs(&mut rig).await;
+        let after = rig.machine.observe();
+        assert_eq!(after.output_frequency, before.output_frequency, "{family}: {deeds:?}: {refused}");
+        // It is the judgement of the start itself.
+        let start = rig.drive.start(*direction).await.expect_err("it is refused too");
+        assert_eq!(start, refused, "{family}: {deeds:?}");
+    }
+}
+
+/// A sign that somebody else left in the reference of a motor at rest: a setpoint takes it away, so that the start which it belongs to
+/// is not refused for it.
+#[tokio::test(start_paused = true)]
+async fn a_start_is_not_refused_for_a_sign_that_its_own_setpoint_takes_away() {
+    for (family, negative) in
+        [(Family::ATV28, "LFr -20"), (Family::ATV58, "W401 FF38h"), (Family::ATV312, "LFr -20")]
+    {
+        let mut rig = contract(family).rig();
+        let told = rig.simulated.control(&format!("{} master {negative}", rig.machine.name()));
+        told.unwrap_or_else(|error| panic!("{family}: {error}"));
+        rig.drive.may_start(Direction::Forward, None).await.expect_err("as it stands");
+        start_at(&mut rig, Direction::Forward, 40).await.unwrap_or_else(|error| panic!("{family}: {error}"));
+        runs(&mut rig).await;
+        assert_eq!(rig.machine.observe().output_frequency, 4_000, "{family}");
+    }
+    // Of the two references of an Altivar 28 it takes one away, and the other stays.
+    let mut rig = contract(Family::ATV28).rig();
+    let told = rig.simulated.control(&format!("{} master LFRD -600", rig.machine.name()));
+    told.expect("it takes a speed");
+    start_at(&mut rig, Direction::Forward, 40).await.expect_err("the speed turns the other way");
+    assert!(bench::written(&rig.machine, setpoint_register(Family::ATV28)).is_empty());
 }
 
 #[tokio::test(start_paused = true)]

@@ -16,7 +16,8 @@ use crate::{
 };
 
 impl<P: Port> Drive3g3ev<P> {
-    pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
+    /// Refuses a start that would not come into force, before anything is written.
+    pub(crate) async fn check_start(&mut self, direction: Direction) -> Result<()> {
         let order = Order::Start(direction);
         let status = self.read_status(Class::Command).await?;
         if status.is_fault() {
@@ -31,6 +32,11 @@ impl<P: Port> Drive3g3ev<P> {
             let cut = withheld(&status).filter(|_| is_run(&status));
             return Err(self.refused(order, cut.unwrap_or(Refusal::State(State::NotReady))));
         }
+        Ok(())
+    }
+
+    pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
+        self.check_start(direction).await?;
         // The inputs of n06 to n08 stand in the same word, and are left as they are.
         if self.command.is_none() {
             self.read_command(Class::Command).await?;

@@ -67,6 +67,11 @@ impl<P: Port> Drive for Drive3g3ev<P> {
         self.start_motor(direction).await
     }
 
+    async fn may_start(&mut self, direction: Direction, _: Option<Setpoint>) -> Result<()> {
+        self.registers.begin_order();
+        self.check_start(direction).await
+    }
+
     /// Stops by a run command of 0, the only stop that the manual has, whatever mode is asked for: the motor stops in the
     /// way that the drive is set to. The inputs of 0001h (bits 4 to 6) stay as the drive held them last; of a drive that was
     /// never read they become 0. It is confirmed when 0001h holds no run command and the drive does not run, or its output

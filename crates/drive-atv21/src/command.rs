@@ -33,6 +33,7 @@ impl<P: Port> Atv21<P> {
         let reference = self.reference(setpoint).await?;
         let slots = self.write_slots().await?;
         let block = slots.filter(|slots| command_and_reference(*slots, 0, 0).is_some());
+        self.judge_start(direction).await?;
         let Some(slots) = block else {
             self.write_setpoint(setpoint).await?;
             self.registers.begin_order();
@@ -49,11 +50,10 @@ impl<P: Port> Atv21<P> {
         direction: Direction,
         block: Option<([WriteSlot; 2], u16)>,
     ) -> Result<Status> {
-        let command = Command::Start(direction);
-        self.check_own(command).await?;
-        let (status, held) = self.check_start(command).await?;
-        let word = self.run_word(direction, held);
-        self.take_command(command, status, held, word).await?;
+        let (held, word) = self.judge_start(direction).await?;
+        if Self::takes(held, word) {
+            self.take_command(Command::Start(direction), held, word).await?;
+        }
         // The lease is there before the word is on its way: a call that is dropped here leaves somebody who withdraws
         // it.
         self.watch.run.give(Lease::new(direction, word.bits()));
@@ -82,6 +82,37 @@ impl<P: Port> Atv21<P> {
             Err(error) => return Err(error),
         }
         self.see_start(direction, word).await.map_err(Error::after_write)
+    }
+
+    /// Refuses a start that would not come into force, as far as that is known before anything is written. Else what FA00 holds, and
+    /// the run command. Where FA00 has to take command first, only that shows who decides then.
+    pub(crate) async fn judge_start(&mut self, direction: Direction) -> Result<(CommandWord, CommandWord)> {
+        let command = Command::Start(direction);
+        self.check_own(command).await?;
+        let (status, held) = self.check_start(command).await?;
+        let word = self.run_word(direction, held);
+        if !Self::takes(held, word)
+            && let Some(reason) = self.decides_instead(&status, held).await?
+        {
+            return Err(self.refused(command, reason));
+        }
+        Ok((held, word))
+    }
+
+    /// Whether `word` makes the bus the active source by what it holds besides its run command, and FA00 does not yet.
+    fn takes(held: CommandWord, word: CommandWord) -> bool {
+        let run = CommandWord::RUN | CommandWord::REVERSE;
+        held - run != word - run && !held.contains(CommandWord::RUN)
+    }
+
+    /// What decides instead of the bus, or keeps the output off, with this word in FA00.
+    async fn decides_instead(&mut self, status: &Status, word: CommandWord) -> Result<Option<Refusal>> {
+        let st_off = status_word(status).contains(StatusWord::FREEWHEEL).then_some(ST_OFF);
+        let because = match commanded_by_other(status) {
+            None => not_in_force(word, self.active_reference().await?),
+            other => other,
+        };
+        Ok(because.or(st_off))
     }
 
     /// Refuses a start that the drive is not ready for, and reads what FA00 holds.
@@ -117,38 +148,20 @@ impl<P: Port> Atv21<P> {
 
     /// Makes the bus the active source of command and reference by what `word` holds besides its run command, and sees
     /// that it is, before a run command is written. Where something else decides, FA00 gets back what it held.
-    async fn take_command(
-        &mut self,
-        command: Command,
-        mut status: Status,
-        held: CommandWord,
-        word: CommandWord,
-    ) -> Result<()> {
-        let run = CommandWord::RUN | CommandWord::REVERSE;
-        let taken = held - run != word - run && !held.contains(CommandWord::RUN);
-        if taken {
-            self.write_command_word(word - run).await?;
-            status = self.read_briefly().await?;
-        }
-        let stands = if taken { word } else { held };
+    async fn take_command(&mut self, command: Command, held: CommandWord, word: CommandWord) -> Result<()> {
+        self.write_command_word(word - CommandWord::RUN - CommandWord::REVERSE).await?;
         let mut settling = Confirming::within(SETTLED_WITHIN);
         let reason = loop {
-            let st_off = status_word(&status).contains(StatusWord::FREEWHEEL).then_some(ST_OFF);
-            let because = match commanded_by_other(&status) {
-                None => not_in_force(stands, self.active_reference().await?),
-                other => other,
-            };
-            match because.or(st_off) {
+            let status = self.read_briefly().await?;
+            match self.decides_instead(&status, word).await? {
                 None => return Ok(()),
-                Some(reason) if !taken || !settling.again().await => break reason,
-                Some(_) => status = self.read_briefly().await?,
+                Some(reason) if !settling.again().await => break reason,
+                Some(_) => {}
             }
         };
-        if taken {
-            // What acts once has acted: written again it would trip or reset the drive once more.
-            let before = CommandWord::from_bits_truncate(held.bits()) - CommandWord::EDGES;
-            self.write_command_word(before).await?;
-        }
+        // What acts once has acted: written again it would trip or reset the drive once more.
+        let before = CommandWord::from_bits_truncate(held.bits()) - CommandWord::EDGES;
+        self.write_command_word(before).await?;
         Err(self.refused(command, reason))
     }
 
@@ -304,7 +317,8 @@ impl<P: Port> Atv21<P> {
     }
 
     /// The status, and after all that it shows FA00. FD01 is read before FE45: where another commands, who may have taken the motor
-    /// between the two and runs it, all is read again.
+    /// between the two and runs it, all is read again. Who takes it while FA00 is read is told by the next status: with FE45 last, a
+    /// start that comes late would be hidden instead, and both in one exchange the drive does not tell.
     async fn status_and_command_word(&mut self) -> Result<(Status, CommandWord)> {
         let mut status = self.read_status(Class::Command).await?;
         if commanded_by_other(&status).is_some() && !status_word(&status).contains(StatusWord::RUN) {

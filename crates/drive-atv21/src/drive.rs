@@ -79,6 +79,12 @@ impl<P: Port> Drive for Atv21<P> {
         self.start_motor(direction, None).await
     }
 
+    /// What FA00 has to be written for first, only [`start`](Drive::start) sees: who commands once the priorities stand there.
+    async fn may_start(&mut self, direction: Direction, _: Option<Setpoint>) -> Result<()> {
+        self.registers.begin_order();
+        self.judge_start(direction).await.map(drop)
+    }
+
     /// Writes FA00 at once, with bits 4 to 6, 14 and 15 as the drive held them last; of a drive that was never read C000h
     /// with the mode's bit. A fast stop is one by ramp. It is confirmed when FA00 reads back and FD01 does not run, or the
     /// output goes down, the bus commands and no input forces anything (F110 to F113, F118). Where somebody else runs the

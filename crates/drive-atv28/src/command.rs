@@ -2,8 +2,8 @@
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Class, Control, Direction, Effect, OwnRun, Port, Refusal, Result, SlaveAddress, State,
-    Status, StopMode, Verdict,
+    BroadcastWrite, Class, Control, Direction, Effect, OwnRun, Port, Refusal, Result, Setpoint, SlaveAddress,
+    State, Status, StopMode, Verdict,
 };
 use drive_drivecom::{self as drivecom, ChartState, Drivecom, RunShown, StopWord};
 
@@ -108,7 +108,12 @@ impl<P: Port> Drivecom for Atv28<P> {
         Ok(())
     }
 
-    async fn refuses_start(&mut self, _: Direction, status: &Status) -> Result<Option<Refusal>> {
+    async fn refuses_start(
+        &mut self,
+        _: Direction,
+        setpoint: Option<Setpoint>,
+        status: &Status,
+    ) -> Result<Option<Refusal>> {
         let words = FastWords::of_raw(&status.raw).state_words();
         if let Some(reason) = words.refuses_to_take_over() {
             return Ok(Some(reason));
@@ -117,12 +122,17 @@ impl<P: Port> Drivecom for Atv28<P> {
         if words.is_driving() && words.chart() == Some(ChartState::QuickStopActive) {
             return Ok(Some(Refusal::State(State::QuickStop)));
         }
-        // A sign that somebody else left would turn the direction round.
         let mut calls = self.registers.at(Class::Command);
-        let references =
-            [calls.read(LFR).await?, self.absent.word(&mut calls, LFRD.address()).await?.unwrap_or(0)];
-        let negative = references.iter().any(|word| word.cast_signed() < 0);
-        Ok(negative.then_some(Refusal::Settings(
+        let frequency = calls.read(LFR).await?;
+        let speed = self.absent.word(&mut calls, LFRD.address()).await?.unwrap_or(0);
+        let [frequency, speed] = [frequency, speed].map(|word| word.cast_signed() < 0);
+        // A setpoint replaces one of the two.
+        let stays = match setpoint {
+            Some(Setpoint::Frequency(_)) => speed || frequency && self.is_negative().await?,
+            Some(Setpoint::Speed(_)) => frequency || speed && self.is_negative().await?,
+            Some(Setpoint::Share(_)) | None => frequency || speed,
+        };
+        Ok(stays.then_some(Refusal::Settings(
             "a reference on the bus (LFr or LFRD) is negative: stop the motor, and give a setpoint in its unit first",
         )))
     }

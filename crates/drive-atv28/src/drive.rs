@@ -99,6 +99,11 @@ impl<P: Port> Drive for Atv28<P> {
         drivecom::start(self, direction, ControlWord::run(direction).bits()).await
     }
 
+    async fn may_start(&mut self, direction: Direction, setpoint: Option<Setpoint>) -> Result<()> {
+        self.registers.begin_order();
+        drivecom::may_start(self, direction, setpoint).await
+    }
+
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
         Ok(drivecom::stop(self, mode).await?.held_by(&self.proof.watch.shaft))
     }

@@ -41,7 +41,7 @@ impl<P: Port> Atv28<P> {
 
     /// Whether the reference that stands turns the motor against its run command, as another master may have left it: a setpoint
     /// leaves that as it is, while the motor is driven or might be. One for a motor that nothing runs has no sign.
-    async fn is_negative(&mut self) -> Result<bool> {
+    pub(crate) async fn is_negative(&mut self) -> Result<bool> {
         let words = self.fast_words(Class::Command).await?;
         let (held, lfr) = self.read_held(Class::Command).await?;
         let (state, command) = (words.state_words(), ControlWord::from_bits_retain(held));

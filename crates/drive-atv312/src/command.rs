@@ -3,7 +3,7 @@
 
 use async_trait::async_trait;
 use drive_core::{
-    Class, Command, Control, Direction, Effect, Error, OwnRun, Port, Recognised, Refusal, Result,
+    Class, Command, Control, Direction, Effect, Error, OwnRun, Port, Recognised, Refusal, Result, Setpoint,
     SlaveAddress, State, Status, StopMode, Stopped, Verdict,
     registers::{Register, access::ReadWrite},
 };
@@ -85,22 +85,34 @@ impl<P: Port> Atv312<P> {
         }
     }
 
-    /// What the control variables forbid: a lock, or a sign that would turn the direction round.
-    async fn refuses_variables(&mut self, controls: Controls) -> Result<Option<Refusal>> {
+    /// What the control variables forbid: a lock, or a sign that would turn the direction round. `LFr` and `LFRD` are images of the
+    /// one reference of the bus, so a setpoint of either kind replaces both.
+    async fn refuses_variables(
+        &mut self,
+        controls: Controls,
+        setpoint: Option<Setpoint>,
+    ) -> Result<Option<Refusal>> {
         let rpm = self.registers.at(Class::Command).read(LFRD).await?;
+        let negative = controls.reference.cast_signed() < 0 || rpm.cast_signed() < 0;
         Ok(if controls.cmi.contains(ExtendedControl::NO_CONSISTENCY_CHECK) {
             Some(Refusal::Settings(
                 "the drive checks no consistency and is locked on standstill (CMI bit 15): clear that bit",
             ))
         } else if controls.cmi.contains(ExtendedControl::LOCK) {
             Some(Refusal::Settings("the drive is locked on standstill (CMI bit 13): clear that bit"))
-        } else if controls.reference.cast_signed() < 0 || rpm.cast_signed() < 0 {
+        } else if negative && (setpoint.is_none() || self.keeps_sign(&controls).await?) {
             Some(Refusal::Settings(
                 "the reference on the bus is negative: stop the motor, and give a setpoint before the start",
             ))
         } else {
             None
         })
+    }
+
+    /// Whether a setpoint would leave the reference its sign.
+    async fn keeps_sign(&mut self, controls: &Controls) -> Result<bool> {
+        let words = self.fast_words(Class::Command).await?;
+        self.is_negative(&words, controls).await
     }
 
     /// A run command of the terminals that acts as soon as they command, because the level of their inputs counts and not an
@@ -195,7 +207,12 @@ impl<P: Port> Drivecom for Atv312<P> {
         Ok(())
     }
 
-    async fn refuses_start(&mut self, direction: Direction, status: &Status) -> Result<Option<Refusal>> {
+    async fn refuses_start(
+        &mut self,
+        direction: Direction,
+        setpoint: Option<Setpoint>,
+        status: &Status,
+    ) -> Result<Option<Refusal>> {
         self.recognise_itself().await?;
         if let Some(reason) = self.refuses_writes() {
             return Ok(Some(reason));
@@ -219,7 +236,7 @@ impl<P: Port> Drivecom for Atv312<P> {
                 return Ok(Some(reason));
             }
         }
-        match self.refuses_variables(controls).await? {
+        match self.refuses_variables(controls, setpoint).await? {
             None => self.other_reference().await,
             refusal => Ok(refusal),
         }

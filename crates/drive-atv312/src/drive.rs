@@ -61,6 +61,11 @@ impl<P: Port> Drive for Atv312<P> {
         drivecom::start(self, direction, ControlWord::run(direction).bits()).await
     }
 
+    async fn may_start(&mut self, direction: Direction, setpoint: Option<Setpoint>) -> Result<()> {
+        self.registers.begin_order();
+        drivecom::may_start(self, direction, setpoint).await
+    }
+
     /// [`StopMode::Ramp`] is 100Fh, which stops as `Stt` says, where that is no injection; [`StopMode::Fast`] 400Fh where it is
     /// known to act and the quick stop 0002h otherwise; [`StopMode::Freewheel`] 0000h; [`StopMode::DcInjection`] 200Fh where
     /// `LAC` or `dCI` allow it. What does not act is replaced by what `Stt` says, and else by the fast stop. A drive whose

@@ -89,7 +89,7 @@ impl<P: Port> Atv312<P> {
 
     /// Whether the reference that stands turns the motor against its run command: a setpoint leaves that as it is, while the motor
     /// is driven or might be. One for a motor that nothing runs has no sign.
-    async fn is_negative(&mut self, words: &FastWords, controls: &Controls) -> Result<bool> {
+    pub(crate) async fn is_negative(&mut self, words: &FastWords, controls: &Controls) -> Result<bool> {
         let state = words.state_words();
         let by_bus = state.control() == Control::Bus;
         let command = self.known.settings.meaning(controls.command);

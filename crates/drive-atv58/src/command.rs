@@ -2,8 +2,8 @@
 
 use async_trait::async_trait;
 use drive_core::{
-    Class, Direction, Effect, Error, Frequency, OwnRun, Port, RawWord, Refusal, Result, SlaveAddress, Status,
-    StopMode, Verdict,
+    Class, Direction, Effect, Error, Frequency, OwnRun, Port, RawWord, Refusal, Result, Setpoint,
+    SlaveAddress, Status, StopMode, Verdict,
 };
 use drive_drivecom::{self as drivecom, ChartState, Drivecom, RunShown, StopWord};
 
@@ -114,13 +114,18 @@ impl<P: Port> Drivecom for Atv58<P> {
         Ok(())
     }
 
-    async fn refuses_start(&mut self, _: Direction, status: &Status) -> Result<Option<Refusal>> {
+    async fn refuses_start(
+        &mut self,
+        _: Direction,
+        setpoint: Option<Setpoint>,
+        status: &Status,
+    ) -> Result<Option<Refusal>> {
         if let Some(control) = status.control {
             return Ok(Some(Refusal::NotInControl(control)));
         }
-        // A sign that somebody else left would turn the direction round.
         let negative = self.registers.at(Class::Command).read(W401).await?.cast_signed() < 0;
-        Ok(negative.then_some(Refusal::Settings(
+        let stays = negative && (setpoint.is_none() || self.is_negative().await?);
+        Ok(stays.then_some(Refusal::Settings(
             "the reference W401 is negative: stop the motor, and give a setpoint",
         )))
     }

@@ -81,6 +81,12 @@ impl<P: Port> Drive for Atv58<P> {
         drivecom::start(self, direction, word).await
     }
 
+    async fn may_start(&mut self, direction: Direction, setpoint: Option<Setpoint>) -> Result<()> {
+        self.registers.begin_order();
+        self.run_word(direction)?;
+        drivecom::may_start(self, direction, setpoint).await
+    }
+
     /// [`StopMode::Ramp`] is the word of the map, the quick stop 0002h where it names none; [`StopMode::DcInjection`], for which
     /// the manual names no bit, is replaced by that ramp.
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {

@@ -40,7 +40,7 @@ impl<P: Port> Atv58<P> {
 
     /// Whether the reference that stands turns the motor against its run command, as another master may have left it: a setpoint
     /// leaves that as it is, while the motor turns or might. One for a motor that nothing runs has no sign.
-    async fn is_negative(&mut self) -> Result<bool> {
+    pub(crate) async fn is_negative(&mut self) -> Result<bool> {
         let status = self.read_status(Class::Command).await?;
         let (_, reference) = self.read_held(Class::Command).await?;
         let chart = status.raw(self.map.status).and_then(ChartState::of);

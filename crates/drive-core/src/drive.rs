@@ -180,13 +180,17 @@ pub trait Drive: Send {
     /// [`stop`](Self::stop) takes it back.
     async fn start(&mut self, direction: Direction) -> Result<Status>;
 
-    /// Whether [`start`](Self::start) would refuse this direction as the drive is now. Asked before the setpoint that belongs to a start
-    /// is given: a start that is refused has changed no speed of a motor that runs by somebody else's command. Nothing is written.
+    /// Whether [`start`](Self::start) would refuse this direction as the drive is now; with a setpoint: once that was given, as far
+    /// as it mends what speaks against a start. Asked before the setpoint that belongs to a start is given: a start that is refused
+    /// has changed no speed of a motor that runs by somebody else's command. Nothing is written.
+    ///
+    /// # For implementors
+    /// What refuses the start itself **must** answer here, so that there is one judgement.
     ///
     /// # Errors
     /// Those of [`start`](Self::start), as far as they are known before anything is written.
-    async fn may_start(&mut self, direction: Direction) -> Result<()> {
-        let _ = direction;
+    async fn may_start(&mut self, direction: Direction, setpoint: Option<Setpoint>) -> Result<()> {
+        let _ = (direction, setpoint);
         Ok(())
     }
 

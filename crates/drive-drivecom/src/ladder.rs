@@ -9,7 +9,7 @@ use super::{
 };
 use drive_core::{
     Class, Command, Confirming, Control, Direction, Effect, Error, ErrorKind, ExceptionMeaning, Frequency,
-    Lease, OwnRun, Refusal, Result, SlaveAddress, State, Status, StopMode, Stopped, Withdrawn,
+    Lease, OwnRun, Refusal, Result, Setpoint, SlaveAddress, State, Status, StopMode, Stopped, Withdrawn,
 };
 
 /// After how many readings that do not show a stop it is written again: half a second apart, once the readings have found
@@ -67,7 +67,15 @@ pub trait Drivecom: Send {
     /// Why this drive is not to be started, from a fresh status: local control, a forbidden direction, settings. That
     /// it has not tripped, is in a known state and shows no output in a quick stop is checked apart. May read more of the
     /// drive.
-    async fn refuses_start(&mut self, direction: Direction, status: &Status) -> Result<Option<Refusal>>;
+    ///
+    /// A sign that somebody else left in the reference would turn the direction round. The `setpoint` that is to be given first,
+    /// if there is one, takes it away where no motor is driven by it, and leaves it else.
+    async fn refuses_start(
+        &mut self,
+        direction: Direction,
+        setpoint: Option<Setpoint>,
+        status: &Status,
+    ) -> Result<Option<Refusal>>;
 
     /// Whether the run command `word` is in force, in the state operation enabled: the drive holds it, the bus is its
     /// active source of commands and of the reference, and the motor is driven that way. May read more of the drive, and
@@ -151,7 +159,7 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
     let refused = |reason| Error::Refused { slave, command, reason };
 
     let mut status = drive.read_status(Class::Command).await?;
-    let mut climb = may_start(drive, direction, &status).await?.map_err(refused)?;
+    let mut climb = climb_from(drive, direction, None, &status).await?.map_err(refused)?;
     let mut confirming = Confirming::begin();
     let mut given = false;
     let mut shown = RunShown::NotYet;
@@ -221,10 +229,26 @@ fn keep_lease(own: &mut OwnRun, written: &Result<()>) {
     }
 }
 
-/// A climb from where the drive stands, or why there is none.
-async fn may_start<D: Drivecom>(
+/// Whether [`start`] would refuse this direction, once the setpoint was given where there is one. Nothing is written.
+///
+/// # Errors
+/// [`Error::Refused`], as of the start.
+pub async fn may_start<D: Drivecom>(
     drive: &mut D,
     direction: Direction,
+    setpoint: Option<Setpoint>,
+) -> Result<()> {
+    let (slave, command) = (drive.address(), Command::Start(direction));
+    let status = drive.read_status(Class::Command).await?;
+    let climb = climb_from(drive, direction, setpoint, &status).await?;
+    climb.map(drop).map_err(|reason| Error::Refused { slave, command, reason })
+}
+
+/// A climb from where the drive stands, or why there is none.
+async fn climb_from<D: Drivecom>(
+    drive: &mut D,
+    direction: Direction,
+    setpoint: Option<Setpoint>,
     status: &Status,
 ) -> Result<Result<Climb, Refusal>> {
     let state = chart_of(drive.status_register(), status);
@@ -235,7 +259,7 @@ async fn may_start<D: Drivecom>(
         Some(state) => Climb::from(state),
     };
     let Some(climb) = climb else { return Ok(Err(Refusal::State(State::NotReady))) };
-    if let Some(reason) = drive.refuses_start(direction, status).await? {
+    if let Some(reason) = drive.refuses_start(direction, setpoint, status).await? {
         return Ok(Err(reason));
     }
     // The way out of a quick stop disables the voltage: a motor that still turns, or of which nothing says that it does

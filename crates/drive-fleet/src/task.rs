@@ -354,7 +354,7 @@ async fn call(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Re
 /// A motor that runs by somebody else's command is not given the setpoint of a start that it will refuse.
 async fn given(drive: &mut dyn Drive, setpoint: Setpoint, start: Option<Direction>) -> Result<(), Error> {
     if let Some(direction) = start {
-        drive.may_start(direction).await?;
+        drive.may_start(direction, Some(setpoint)).await?;
     }
     drive.set_setpoint(setpoint).await
 }

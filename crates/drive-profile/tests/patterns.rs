@@ -288,12 +288,12 @@ async fn a_start_that_would_be_refused_is_known_before_anything_is_written() {
     rig.machine.written_by_another(0x2000, 1).expect("a run command");
     rig.until_machine("it runs", |seen| seen.output_frequency == 2_000).await;
     let before = rig.machine.requests(6);
-    let refused = rig.drive.may_start(Direction::Forward).await.expect_err("another has started it");
+    let refused = rig.drive.may_start(Direction::Forward, None).await.expect_err("another has started it");
     assert_eq!(refused.kind(), ErrorKind::Refused, "{refused}");
     assert_eq!(rig.machine.requests(6), before, "nothing is written to ask that");
     rig.machine.written_by_another(0x2000, 5).expect("a stop");
     rig.until_machine("it stands", |seen| !seen.running && seen.shaft_frequency == 0).await;
-    rig.drive.may_start(Direction::Forward).await.expect("nothing speaks against it");
+    rig.drive.may_start(Direction::Forward, None).await.expect("nothing speaks against it");
 }
 
 const SPACES: &str = include_str!("data/spaces.toml");

@@ -120,7 +120,12 @@ impl Drivecom for Chart {
         refused.map_or(Ok(()), Err)
     }
 
-    async fn refuses_start(&mut self, _: Direction, _: &Status) -> Result<Option<Refusal>> {
+    async fn refuses_start(
+        &mut self,
+        _: Direction,
+        _: Option<Setpoint>,
+        _: &Status,
+    ) -> Result<Option<Refusal>> {
         Ok(self.refuses)
     }
 

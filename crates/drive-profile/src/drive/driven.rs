@@ -71,7 +71,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
         self.start_motor(direction).await
     }
 
-    async fn may_start(&mut self, direction: Direction) -> Result<()> {
+    async fn may_start(&mut self, direction: Direction, _: Option<Setpoint>) -> Result<()> {
         self.registers.begin_order();
         self.start_is_allowed(direction).await.map(drop)
     }

@@ -98,8 +98,8 @@ impl Drive for Faulty {
         self.drive.run_word_for(direction)
     }
 
-    async fn may_start(&mut self, direction: Direction) -> Result<()> {
-        self.drive.may_start(direction).await
+    async fn may_start(&mut self, direction: Direction, setpoint: Option<Setpoint>) -> Result<()> {
+        self.drive.may_start(direction, setpoint).await
     }
 
     fn adopt(&mut self, lease: Lease) {
