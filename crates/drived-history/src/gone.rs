@@ -21,16 +21,27 @@ pub(crate) struct Went {
     reference: Frequency,
     /// How far they lie apart: in that time nobody here looked at it.
     unread_ms: u64,
+    /// For how long its output had been falling then: some drives show only when they stand that their run command went.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    falling_ms: Option<u64>,
 }
 
 impl fmt::Display for Went {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { reference_before, reference, unread_ms } = self;
-        let apart = Duration::from_millis(*unread_ms).as_secs_f64();
-        write!(
-            f,
-            "its run command went between two readings that lie {apart:.1} s apart, and its reference "
-        )?;
+        let Self { reference_before, reference, unread_ms, falling_ms } = self;
+        let seconds = |ms: u64| Duration::from_millis(ms).as_secs_f64();
+        match falling_ms {
+            Some(falling) => write!(
+                f,
+                "its run command was gone when that was read, its output had been falling for {:.1} s, and its reference ",
+                seconds(*falling)
+            ),
+            None => write!(
+                f,
+                "its run command went between two readings that lie {:.1} s apart, and its reference ",
+                seconds(*unread_ms)
+            ),
+        }?;
         match *reference {
             Frequency::ZERO => write!(f, "with it: from {reference_before} to 0"),
             stayed if stayed == *reference_before => write!(f, "stayed at {stayed}"),
@@ -42,8 +53,17 @@ impl fmt::Display for Went {
 /// Follows the run command of one drive.
 #[derive(Debug, Default)]
 pub(crate) struct Gone {
-    /// When it was read last with a run command of this side, and its reference then.
-    ran: Option<(Instant, Frequency)>,
+    /// How it was read last with a run command of this side.
+    ran: Option<Ran>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Ran {
+    at: Instant,
+    reference: Frequency,
+    output: Option<Frequency>,
+    /// Where its output was when it had not fallen yet, and when that was.
+    level: (Instant, Option<Frequency>),
 }
 
 impl Gone {
@@ -56,14 +76,29 @@ impl Gone {
             Some(Verdict::NotInForce { lacks: Lack::Command, because: Refusal::Overridden { .. } })
         );
         if overridden {
-            let is_earlier =
-                |(at, before): &(Instant, Frequency)| *at < status.at && *before != Frequency::ZERO;
-            let (at, before) = self.ran.take().filter(is_earlier)?;
-            let apart = status.at.saturating_duration_since(at);
-            let unread_ms = u64::try_from(apart.as_millis()).unwrap_or(u64::MAX);
-            return Some(Went { reference_before: before, reference, unread_ms });
+            let is_earlier = |ran: &Ran| ran.at < status.at && ran.reference != Frequency::ZERO;
+            let ran = self.ran.take().filter(is_earlier)?;
+            let since = |at: Instant| {
+                let apart = status.at.saturating_duration_since(at);
+                u64::try_from(apart.as_millis()).unwrap_or(u64::MAX)
+            };
+            // By more than a load that comes and goes.
+            let has_fallen = ran
+                .output
+                .zip(ran.level.1)
+                .is_some_and(|(now, level)| now.centihertz() / 9 < level.centihertz() / 10);
+            let falling_ms = has_fallen.then(|| since(ran.level.0));
+            return Some(Went {
+                reference_before: ran.reference,
+                reference,
+                unread_ms: since(ran.at),
+                falling_ms,
+            });
         }
-        self.ran = snapshot.started_here().then_some((status.at, reference));
+        let output = status.value.output_frequency;
+        let fell = |before: &Ran| before.output.zip(output).is_some_and(|(before, now)| now < before);
+        let level = self.ran.filter(fell).map_or((status.at, output), |ran| ran.level);
+        self.ran = snapshot.started_here().then_some(Ran { at: status.at, reference, output, level });
         None
     }
 }
@@ -121,6 +156,16 @@ mod tests {
             [shown(0, hertz(30), false), shown(500, hertz(30), false), shown(1_000, hertz(30), true)];
         let text = "its run command went between two readings that lie 0.5 s apart, and its reference stayed at 30.00 Hz";
         assert_eq!(told(stopped), [None, None, Some(text.to_owned())]);
+        // A drive whose state runs on until its motor stands: belt 1, whose output fell by 10 Hz from each reading to the next.
+        let ramped = [(0, 30), (500, 22), (1_000, 12), (1_500, 3), (2_000, 0)].map(|(after, output)| {
+            let mut seen = shown(after, hertz(30), after == 2_000);
+            Arc::make_mut(&mut seen.status.as_mut().unwrap().value).output_frequency = Some(hertz(output));
+            seen
+        });
+        let mut gone = Gone::default();
+        let said: Vec<String> = ramped.iter().filter_map(|seen| Some(gone.look(seen)?.to_string())).collect();
+        let text = "its run command was gone when that was read, its output had been falling for 2.0 s, and its reference stayed at 30.00 Hz";
+        assert_eq!(said, [text]);
         // A reference of zero tells nothing: it was that before.
         let slow = [shown(0, hertz(0), false), shown(500, hertz(0), true), shown(1_000, hertz(0), true)];
         assert_eq!(told(slow), [None, None, None]);

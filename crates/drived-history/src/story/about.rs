@@ -4,6 +4,7 @@ use drived_plant::plant::past::{Certainty, RecordView, SentenceView as Sentence}
 
 use super::{
     body::{Cause, body},
+    cause::causes,
     facts::{Facts, begins, lasting},
 };
 
@@ -16,6 +17,13 @@ const CLOCK_MS: i64 = 1_000;
 const FAR_MS: i64 = 10_000;
 /// What is heavier than what is asked for is told beside it within this time.
 const BESIDE_MS: i64 = 300_000;
+/// Of a moment, what was so shortly before and behind it is told with it,
+const ALSO_BEFORE_MS: i64 = 3_000;
+const ALSO_AFTER_MS: i64 = 10_000;
+/// and so many of it at the most.
+const ALSO: usize = 8;
+/// What is told of one reading is recorded within this time.
+const ONE_READING_MS: i64 = 150;
 /// What a story is about, the weightiest first. `run`: a motor began or ceased to run.
 const WEIGHT: [&str; 27] = [
     "tripped",
@@ -84,7 +92,10 @@ fn weight(facts: &Facts, found: &RecordView) -> Option<usize> {
         // A start that was asked for is told as that.
         ends || begins && !matches!(body.cause, Some(Cause::Command { .. }))
     };
+    // That the program ends is what somebody asks for who asks for nothing else.
+    let ends = matches!(facts.cause_of(found), Some(Cause::Policy { policy }) if policy == "exit");
     match &*found.what {
+        _ if ends => of(&found.what).map(|_| WEIGHT.len()),
         "control_taken" if facts.is_fallen_back(found) => of("control_returned"),
         "state_changed" if is_run() => of("run"),
         what => of(what),
@@ -107,7 +118,10 @@ fn told_of(facts: &Facts) -> impl Iterator<Item = (usize, i64, &RecordView)> {
 pub(super) fn about(facts: &Facts, asked: Asked) -> Option<&RecordView> {
     let then = told_of(facts)
         .filter(|(_, begins, _)| asked.is_met_by(*begins))
-        .min_by_key(|(weight, begins, found)| (*weight, asked.distance(*begins), found.number));
+        // What was seen shortly before it is meant where nothing was seen with it: whoever asks has read his clock.
+        .min_by_key(|(weight, begins, found)| {
+            (*begins < asked.from, *weight, asked.distance(*begins), found.number)
+        });
     let near = || {
         told_of(facts)
             .filter(|(_, begins, _)| asked.distance(*begins) <= SHOWN_MS)
@@ -132,6 +146,48 @@ pub(super) fn about(facts: &Facts, asked: Asked) -> Option<&RecordView> {
             .min_by_key(|(weight, begins, found)| (asked.distance(*begins), *weight, found.number))
     };
     then.or_else(near).or_else(unseen).or_else(soon).map(|(_, _, found)| found)
+}
+
+/// What else happened then, in its order: each with what is told first of why.
+pub(super) fn also(facts: &Facts, about: &RecordView, asked: Asked) -> Vec<Sentence> {
+    let (from, to) = match asked.from == asked.to {
+        true => (asked.from - ALSO_BEFORE_MS, asked.to + ALSO_AFTER_MS),
+        false => (asked.from, asked.to),
+    };
+    let mut told = vec![(weight(facts, about).unwrap_or_default(), begins(about), about)];
+    // That a motor that stops then stands is no news.
+    let rest = WEIGHT.iter().position(|one| *one == "state_changed");
+    let mut others: Vec<_> = told_of(facts)
+        .filter(|(weight, begins, _)| Some(*weight) != rest && (from..=to).contains(begins))
+        .collect();
+    others.sort_by_key(|(weight, begins, found)| (*weight, *begins, found.number));
+    for other in others {
+        let is_told = |(_, begins, found): &(usize, i64, &RecordView)| {
+            (begins - other.1).abs() <= ONE_READING_MS
+                || (found.time_unix_ms - other.2.time_unix_ms).abs() <= ONE_READING_MS
+        };
+        if !told.iter().any(is_told) {
+            told.push(other);
+        }
+    }
+    let mut others = told.split_off(1);
+    others.sort_by_key(|(_, begins, found)| (*begins, found.number));
+    let more = others.len().saturating_sub(ALSO);
+    let mut said = Vec::new();
+    for (_, begins, found) in others.into_iter().take(ALSO) {
+        let away = begins - super::facts::begins(about);
+        let side = if away < 0 { "earlier" } else { "later" };
+        let text = format!("{} {side}: {}", lasting(away.abs()), facts.in_words(found));
+        said.push(Sentence::of(Certainty::Seen, text).at(found.time_unix_ms));
+        let why = causes(facts, found).into_iter().next();
+        let is_new = |why: &Sentence| found.kind != "command" && !why.text.contains(&facts.in_words(found));
+        said.extend(why.filter(is_new).map(|why| Sentence { text: format!("to that: {}", why.text), ..why }));
+    }
+    if more > 0 {
+        let text = format!("{more} more happened then: they are told below");
+        said.push(Sentence::of(Certainty::Seen, text));
+    }
+    said
 }
 
 /// What is heavier than what is asked for, before and after it: and not as its cause. Where nothing happened, what

@@ -17,7 +17,8 @@ use rusqlite::Connection;
 
 pub use self::facts::AFTER_MS as LOOKED_AFTER_MS;
 use self::{
-    about::{Asked, about, beside},
+    about::{Asked, about, also, beside},
+    body::body,
     course::{AFTER_MS, BEFORE_MS, course, not_known, settings, with_settings},
     facts::Facts,
     values::{before, moved},
@@ -48,10 +49,12 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
         why.extend(written.cloned());
     }
     let headline = match about {
-        Some(found) => Some(Sentence::of(Certainty::Seen, facts.in_words(found)).at(found.time_unix_ms)),
+        Some(found) => Some(cause::headline(&facts, found)),
         None => moved.first().filter(|_| has_moved).cloned(),
     };
     why.extend(moved);
+    let also = about.map(|about| also(&facts, about, asked)).unwrap_or_default();
+    why.extend(also);
     let beside = beside(&facts, about, moment, &why);
     why.extend(beside);
     // How it was before what is told is how it was before its output began to fall.
@@ -68,8 +71,9 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
 
 /// Whether a drive may show something only when its motor has been ramping down for a while.
 fn shows_late(about: &RecordView) -> bool {
-    matches!(
-        &*about.what,
-        "command_overridden" | "reference_taken" | "output_blocked" | "control_taken" | "state_changed"
-    )
+    match &*about.what {
+        "command_overridden" | "reference_taken" | "output_blocked" | "control_taken" => true,
+        "state_changed" => body(about).from.as_deref() == Some("running"),
+        _ => false,
+    }
 }

@@ -152,6 +152,6 @@ fn fed(facts: &Facts, connected: &RecordView) -> Option<Shows> {
     let runs_on = shown.state.as_deref() == Some("running")
         && shown.control.as_deref() == Some("bus")
         && with_it("state_changed").is_none();
-    let text = "it ran on when it was heard again, and a run command of a bus does not outlast the supply of its drive: that was not away";
+    let text = "it ran on behind it, and a run command of a bus does not outlast the supply of its drive: that was not away";
     runs_on.then(|| Shows::Fed(Sentence::of(Likely, text).at(at)))
 }

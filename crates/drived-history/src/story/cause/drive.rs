@@ -23,13 +23,19 @@ use super::{
 /// What somebody or something did at the drive itself.
 pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, open: &str) -> Vec<Sentence> {
     let has_gone = matches!(&*about.what, "command_overridden" | "run_not_adopted");
-    let (mut all, mut by_word) = (Vec::new(), None);
+    let (mut all, mut by_word, mut said, mut open) = (Vec::new(), None, said, open);
+    let gone = "the drive's own words show that its run command does not stand any more";
     match has_gone.then(|| how_it_went(facts, about)) {
         Some(Went::Unfed(supply)) => {
             all.push(supply);
             all.extend(silent_with(facts, about.time_unix_ms));
+            said = Sentence::of(Said, gone);
+            open = "what took its supply away cannot be seen from the line";
         }
-        Some(Went::ByWord(word)) => by_word = Some(word),
+        Some(Went::ByWord(word)) => {
+            by_word = Some(word);
+            said = Sentence::of(Said, gone);
+        }
         Some(Went::Open(open)) => by_word = open,
         None => {}
     }
@@ -38,7 +44,8 @@ pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, op
     all.extend(lost_before(facts, about.time_unix_ms));
     all.extend(by_word);
     all.extend(falling(facts, about).filter(|_| has_gone));
-    all.extend(acted_upon(facts, about).or_else(|| withdrew(facts, about)));
+    all.extend(acted_upon(facts, about));
+    all.extend(withdrew(facts, about));
     all.extend(seen_beside(facts, about.time_unix_ms));
     if about.what == "output_blocked" {
         all.extend(of_low_speed(facts, about));
@@ -92,18 +99,20 @@ fn acted_upon(facts: &Facts, about: &RecordView) -> Option<Sentence> {
 }
 
 /// Likewise where its output was falling already.
-fn withdrew(facts: &Facts, about: &RecordView) -> Option<Sentence> {
+fn withdrew(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     let own = facts.records.iter().filter(|found| {
         found.drive == about.drive
             && (0..=BESIDE_MS / 6).contains(&(found.time_unix_ms - about.time_unix_ms))
             && found.number >= about.number
     });
-    let (ended, upon) = own.filter_map(|ended| Some((ended, facts.was_ending(ended)?))).next()?;
-    let text = format!(
-        "upon this, this program withdrew its run command by itself: {}; its output was falling by then: whether that or what had begun before it ended the run is not known",
-        facts.told(upon)
-    );
-    Some(Sentence::of(NotKnown, text).at(ended.time_unix_ms))
+    let mut own = own.filter_map(|ended| Some((ended, facts.was_ending(ended)?)));
+    let Some((ended, upon)) = own.next() else { return Vec::new() };
+    let text = "upon this, this program withdrew its run command by itself, and its output was falling by then: whether that or what had begun before it ended the run is not known";
+    let upon = (upon.number != about.number).then(|| {
+        let text = format!("before it the drive had shown: {}", facts.told(upon));
+        Sentence::of(Said, text).at(upon.time_unix_ms)
+    });
+    upon.into_iter().chain([Sentence::of(NotKnown, text).at(ended.time_unix_ms)]).collect()
 }
 
 /// That its output was falling before its run command was seen to have gone.
@@ -157,6 +166,22 @@ fn of_low_speed(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     said
 }
 
+/// What followed it as the doing of somebody here.
+fn followed(facts: &Facts, about: &RecordView) -> Option<Sentence> {
+    let at = about.time_unix_ms;
+    let mut later = facts.records.iter().filter(|found| {
+        found.number > about.number
+            && found.drive == about.drive
+            && found.what == "state_changed"
+            && (at..=at + OBEYED_MS).contains(&found.time_unix_ms)
+    });
+    later.find_map(|found| {
+        let Some(Cause::Command { commander, .. }) = facts.cause_of(found) else { return None };
+        let text = format!("what followed was done for {commander}: {}", found.text);
+        Some(Sentence::of(Seen, text).at(found.time_unix_ms))
+    })
+}
+
 pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     match facts.cause_of(about) {
         Some(Cause::Command { commander, door }) => {
@@ -206,7 +231,6 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                 said.push(Sentence::of(NotKnown, "who pressed it cannot be seen from the line"));
                 return said;
             }
-            said.extend(withdrew(facts, about));
             let shown = shown_before(facts, about).filter(|_| !begins_to_run);
             if let Some(shown) = shown {
                 let text =
@@ -218,15 +242,25 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                 _ if begins_to_run => &["start"],
                 _ => &["stop", "release"],
             };
-            match asked_before(facts, about, actions) {
-                Some(asked) => said.push(
-                    Sentence::of(Likely, format!("a command of here came shortly before: {}", asked.text))
-                        .at(asked.time_unix_ms),
-                ),
+            let asked = asked_before(facts, about, actions);
+            match asked {
+                Some(asked) => {
+                    let text = format!("a command of here came shortly before: {}", asked.text);
+                    said.push(Sentence::of(Likely, text).at(asked.time_unix_ms));
+                    said.extend(followed(facts, about));
+                }
                 None => said.push(nobody_asked(facts, about.time_unix_ms)),
             }
+            said.extend(withdrew(facts, about));
             // A drive says with the same status who commands it.
-            match facts.control_at(at + 1) {
+            let fallen_back = facts.fell_back_with(at);
+            let control = facts.control_at(at + 1).filter(|_| fallen_back.is_none());
+            said.extend(
+                fallen_back.map(|found| {
+                    Sentence::of(Said, format!("the drive says with it: {}", facts.told(found)))
+                }),
+            );
+            match control {
                 Some("bus") if begins_to_run => said.push(Sentence::of(
                     Likely,
                     "it says that a bus commands it: another master has started it",
@@ -237,7 +271,7 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                 _ => {}
             }
             said.extend(seen_beside(facts, at));
-            let by_hand = facts.control_at(at + 1).filter(|control| *control != "bus");
+            let by_hand = control.filter(|control| *control != "bus");
             let who = match &*about.what {
                 _ if by_hand.is_some() => {
                     "who it was, or which of its inputs and keys, cannot be seen from the line"
@@ -253,7 +287,9 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                     "its terminals, its panel, another master or the drive itself: which of them it was is not known, but for what its words show below"
                 }
             };
-            said.push(Sentence::of(NotKnown, who));
+            if asked.is_none() {
+                said.push(Sentence::of(NotKnown, who));
+            }
             said
         }
     }

@@ -112,6 +112,18 @@ pub(super) fn lost_before(facts: &Facts, at: i64) -> Option<Sentence> {
     Some(Sentence::of(Seen, text).at(lost.time_unix_ms))
 }
 
+/// That it had been lost shortly before something that it showed.
+pub(super) fn lost_for(facts: &Facts, about: &RecordView) -> Option<Sentence> {
+    let at = about.time_unix_ms;
+    let lost = facts.records.iter().rev().find(|found| {
+        found.what == "lost"
+            && found.drive == about.drive
+            && (at - BESIDE_MS..=at).contains(&found.time_unix_ms)
+    })?;
+    let text = format!("{} before, it had been lost: {}", lasting(at - begins(lost)), lost.text);
+    Some(Sentence::of(Seen, text).at(lost.time_unix_ms))
+}
+
 /// The loss of the drive that had ended when it was seen again at a moment, and when it ended.
 pub(super) fn loss_before(facts: &Facts, at: i64) -> Option<(&RecordView, i64)> {
     let own =

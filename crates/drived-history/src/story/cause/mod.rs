@@ -43,9 +43,10 @@ use drived_plant::plant::past::{
 
 use self::{
     drive::{at_the_drive, of_change, of_command, of_departure, of_unconfirmed_stop},
-    evidence::{SILENT_MS, TOGETHER_MS},
+    evidence::{BESIDE_MS, SILENT_MS, TOGETHER_MS, lost_for},
     silence::of_loss,
     trip::of_trip,
+    word::{Went, how_it_went},
 };
 use super::facts::{Facts, lasting};
 
@@ -85,6 +86,11 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                 _ => "who or what did it at the drive cannot be seen from the line",
             },
         ),
+        "other_family" | "identity_changed" => {
+            let mut said = vec![Sentence::of(Seen, about.text.clone())];
+            said.extend(lost_for(facts, about));
+            said
+        }
         "stop_unconfirmed" => of_unconfirmed_stop(facts, about),
         "output_departed" => of_departure(facts, about),
         _ if about.kind == "command" => of_command(facts, about),
@@ -95,6 +101,19 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     let of_program: Vec<Sentence> = of_program.into_iter().filter(|one| !is_told(one)).collect();
     said.extend(of_program);
     said
+}
+
+/// What happened, in one line; of a run command that went, by what it went as far as that is likely.
+pub(super) fn headline(facts: &Facts, about: &RecordView) -> Sentence {
+    let is_open = about.what == "command_overridden" && about.text.contains("power cycle");
+    let (certainty, text) = match is_open.then(|| how_it_went(facts, about)) {
+        Some(Went::Unfed(_)) => (Likely, "its run command went with its supply, which was away".to_owned()),
+        Some(Went::ByWord(_)) => {
+            (Likely, "its run command went by another word that was written to it".to_owned())
+        }
+        Some(Went::Open(_)) | None => (Seen, facts.in_words(about)),
+    };
+    Sentence::of(certainty, text).at(about.time_unix_ms)
 }
 
 /// That nothing happened, or that nobody knows.
@@ -122,6 +141,15 @@ pub(super) fn of_nothing(facts: &Facts, at: i64, has_moved: bool) -> Vec<Sentenc
         }
         None => vec![Sentence::of(Seen, "nothing happened to it then that is recorded").at(at)],
     };
+    let errors = facts.records.iter().find(|found| {
+        found.what == "line_errors"
+            && found.line == facts.line
+            && (found.time_unix_ms - at).abs() <= BESIDE_MS
+    });
+    said.extend(
+        errors
+            .map(|errors| Sentence::of(Seen, format!("on its line {}", errors.text)).at(errors.time_unix_ms)),
+    );
     // What ended a time in which nothing is known may be told with it.
     said.extend(program(facts, facts.gap_at(at).map_or(at, |(_, end)| end)));
     said
@@ -132,10 +160,12 @@ fn program(facts: &Facts, at: i64) -> Vec<Sentence> {
     let is_near = |found: &&RecordView| {
         found.kind == "history" && (at - SILENT_MS..=at + TOGETHER_MS).contains(&found.time_unix_ms)
     };
+    let stepped = facts.stepped.as_ref().filter(|step| !is_near(step));
     facts
         .records
         .iter()
         .filter(is_near)
+        .chain(stepped)
         .filter(|found| {
             matches!(
                 &*found.what,

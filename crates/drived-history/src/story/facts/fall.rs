@@ -9,7 +9,7 @@ use super::{
 use crate::quantity::Quantity;
 
 /// An output that moved this long ago does not move any more.
-const MOVES_MS: i64 = 2_000;
+const MOVES_MS: i64 = 1_000;
 /// What is told of a reading has its own reading of the clock.
 const SAME_READING_MS: i64 = 100;
 /// One that was seen to fall only at the last reading fell with it.

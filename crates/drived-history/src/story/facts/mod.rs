@@ -59,6 +59,8 @@ pub(super) struct Facts {
     pub(super) minutes: Vec<LineMinuteView>,
     /// That the clock was set forward over the moment, so that there was no such time.
     pub(super) skipped: Option<RecordView>,
+    /// That the clock was set shortly before the moment, or with it, as it stood then.
+    pub(super) stepped: Option<RecordView>,
 }
 
 /// What a drive shows when it is seen again is told of it within this time.
@@ -78,6 +80,8 @@ const SHOWN: [&str; 10] = [
 ];
 /// A clock that was set forward by more than this skipped no time that somebody would ask for.
 const SKIPPED_MS: i64 = 24 * 60 * 60_000;
+/// So shortly before or behind a moment a clock that was set is told with it.
+const STEPPED_MS: i64 = 5_000;
 /// So many other drives of a line are looked at, whether they were heard.
 const NEIGHBOURS: usize = 64;
 
@@ -90,7 +94,8 @@ impl Facts {
         let to = (at + AFTER_MS).min(last).max(from);
         let filter = Filter { from_ms: from, to_ms: to, limit: RECORDS, ..Filter::default() };
         let Found { records, is_cut } = records(connection, &filter)?;
-        let skipped = skipped(connection, at)?;
+        let skipped = step(connection, at, |from, to| (from..to).contains(&at))?;
+        let stepped = step(connection, at, |from, _| (from - at).abs() <= STEPPED_MS)?;
         let of_drive = |found: &&RecordView| found.drive.as_deref() == Some(drive);
         let line = records.iter().filter(of_drive).find_map(|found| found.line.clone());
         let spans = heard(connection, drive, from, to)?;
@@ -134,6 +139,7 @@ impl Facts {
             heard: Vec::new(),
             minutes,
             skipped,
+            stepped,
         };
         let neighbours: Vec<String> =
             facts.neighbours().into_iter().take(NEIGHBOURS).map(str::to_owned).collect();
@@ -152,11 +158,15 @@ impl Facts {
     }
 }
 
-/// The step of the clock that skipped a moment.
-fn skipped(connection: &Connection, at: i64) -> Result<Option<RecordView>, StoreError> {
+/// The step of the clock within a day of a moment that is the one that is meant, by from where to where it was set.
+fn step(
+    connection: &Connection,
+    at: i64,
+    is_one: impl Fn(i64, i64) -> bool,
+) -> Result<Option<RecordView>, StoreError> {
     let steps = Filter {
         what: Some("clock_stepped"),
-        from_ms: at,
+        from_ms: at.saturating_sub(SKIPPED_MS),
         to_ms: at.saturating_add(SKIPPED_MS),
         limit: RECORDS,
         ..Filter::default()
@@ -164,6 +174,6 @@ fn skipped(connection: &Connection, at: i64) -> Result<Option<RecordView>, Store
     let mut steps = records(connection, &steps)?.records.into_iter();
     Ok(steps.find(|step| {
         let step = body(step);
-        step.from_unix_ms.zip(step.to_unix_ms).is_some_and(|(from, to)| (from..to).contains(&at))
+        step.from_unix_ms.zip(step.to_unix_ms).is_some_and(|(from, to)| is_one(from, to))
     }))
 }

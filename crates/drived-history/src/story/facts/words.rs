@@ -4,6 +4,9 @@ use drived_plant::plant::past::RecordView;
 
 use super::Facts;
 
+/// What is told of one reading is recorded within this time.
+const SAME_READING_MS: i64 = 100;
+
 /// What is told of a run command that does not decide any more, where its drive shows no more than that.
 const ANOTHER: &str = "another run command, which took the place of the one that was given";
 
@@ -39,6 +42,13 @@ impl Facts {
             }
             None => text.to_owned(),
         }
+    }
+
+    /// Where control fell back to with what was read at a moment: what is told of that reading was not done by who has it then.
+    pub(in crate::story) fn fell_back_with(&self, at: i64) -> Option<&RecordView> {
+        self.records
+            .iter()
+            .find(|found| (found.time_unix_ms - at).abs() <= SAME_READING_MS && self.is_fallen_back(found))
     }
 
     /// Whether control that is told as taken is where it was before somebody else had it.

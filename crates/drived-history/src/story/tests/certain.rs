@@ -63,6 +63,9 @@ fn a_run_command_that_went_with_a_motor_that_ramps_down_went_before_that_ramp() 
     assert!(seen.contains("its reference stayed at 30.00 Hz"), "{story:?}");
     assert!(story.why(Certainty::Likely).contains("another word was written to it"), "{story:?}");
     assert!(story.before[0].text.starts_with("running, output 30.00 Hz"), "{:?}", story.before);
+    let about = story.about.unwrap();
+    assert_eq!(about.certainty, Certainty::Likely, "{about:?}");
+    assert_eq!(about.text, "its run command went by another word that was written to it");
 }
 
 /// Another master wrote OFF1 and a setpoint; this program withdrew its run command 2.6 s later, from a motor that came to a standstill.
@@ -152,6 +155,35 @@ fn a_reset_by_an_input_is_told_as_a_reset_and_not_as_control_that_was_taken() {
     assert_eq!(story.about.as_ref().unwrap().text, "fault cleared", "{story:?}");
     assert!(story.why(Certainty::Seen).contains("nobody here asked for it"), "{story:?}");
     assert!(!everything(&story).contains("control taken"), "{story:?}");
+    assert!(!story.why(Certainty::NotKnown).contains("which of its inputs and keys"), "{story:?}");
+    assert!(story.why(Certainty::NotKnown).contains("its terminals, another master"), "{story:?}");
+}
+
+/// The panel was taken at 300.0 s, and its STOP key pressed a second and a half later.
+#[test]
+fn who_asks_for_the_second_of_a_stop_is_told_of_the_stop_and_not_of_what_was_before_it() {
+    let mut night = Written::begin("certain-second");
+    night.heard_for(900);
+    night.event(300_244, "control_taken", "control taken by local", None);
+    night.stops(301_703);
+    night.event(301_704, "stop_key", "stopped by the STOP key of the drive", None);
+    let story = night.told(301_000);
+    assert_eq!(story.about.as_ref().unwrap().text, "state changed: running to ready", "{story:?}");
+    assert!(story.why(Certainty::Said).contains("the STOP key"), "{story:?}");
+    assert!(story.why(Certainty::Seen).contains("control taken by local"), "{story:?}");
+}
+
+/// The clock was set forward by an hour two tenths of a second behind the moment.
+#[test]
+fn a_clock_that_was_set_with_the_moment_is_told_with_it() {
+    let mut night = Written::begin("certain-clock");
+    night.heard_between(&[(0, 290)]);
+    let (from, to) = (super::NIGHT_MS + 290_200, super::NIGHT_MS + 290_200 + 3_600_000);
+    let body = json!({ "from_unix_ms": from, "to_unix_ms": to });
+    let text = "the clock was set forward by 3600.0 s";
+    night.kept(Kind::History, None, 3_890_200, "clock_stepped", text, Some(body));
+    let story = night.told(290_000);
+    assert!(story.why(Certainty::Seen).contains(text), "{story:?}");
 }
 
 #[test]
@@ -214,4 +246,56 @@ fn a_port_that_is_back_is_told_so_and_not_as_why_a_drive_is_still_not_heard() {
     let later = night("certain-port-back").told(327_000);
     assert!(later.about.as_ref().unwrap().text.starts_with("other family"), "{later:?}");
     assert!(!later.why(Certainty::Seen).contains("the port of the line was away"), "{later:?}");
+}
+
+/// Another master stopped the motor and started it again; the panel did the same of another drive, and an input reset a third.
+#[test]
+fn a_minute_with_several_events_tells_all_of_them_in_their_order_and_the_end_of_the_program_last() {
+    let mut night = Written::begin("certain-several");
+    night.heard_for(900);
+    night.event(303_671, "command_overridden", OVERRIDDEN, None);
+    night.changed(322_137, "disabled", "running", "drive");
+    night.asked(340_000, "setpoint", "setpoint 12.50 Hz by hmi from mqtt: confirmed");
+    let by_exit =
+        json!({ "from": "running", "to": "stopping", "cause": { "by": "policy", "policy": "exit" } });
+    night.event(350_000, "state_changed", "state changed: running to stopping", Some(by_exit));
+    let story = night.told(300_000);
+    assert!(story.about.as_ref().unwrap().text.starts_with("command overridden"), "{story:?}");
+    let seen = story.why(Certainty::Seen);
+    let places: Vec<_> = [
+        "18.5 s later: state changed: disabled to running",
+        "36.3 s later: setpoint 12.50 Hz by hmi",
+        "46.3 s later: state changed: running to stopping",
+    ]
+    .map(|text| seen.find(text))
+    .to_vec();
+    assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{places:?} {story:?}");
+}
+
+#[test]
+fn the_end_of_the_program_hides_nothing_that_somebody_asked_for() {
+    let mut night = Written::begin("certain-exit");
+    night.heard_for(900);
+    night.asked(303_000, "setpoint", "setpoint 12.50 Hz by hmi from mqtt: confirmed");
+    let by_exit =
+        json!({ "from": "running", "to": "stopping", "cause": { "by": "policy", "policy": "exit" } });
+    night.event(339_000, "state_changed", "state changed: running to stopping", Some(by_exit));
+    let story = night.told(300_000);
+    assert!(story.about.as_ref().unwrap().text.starts_with("setpoint 12.50 Hz by hmi"), "{story:?}");
+}
+
+/// STOP ALL: the state of a drive by profile is read before the fleet's answer is.
+#[test]
+fn a_stop_of_all_that_came_before_it_leaves_no_four_others_open() {
+    let mut night = Written::begin("certain-stop-all");
+    night.heard_for(900);
+    night.asked(303_002, "stop", "ramp stop of all 7 drives by anonymous from http: confirmed");
+    night.changed(303_409, "running", "stopping", "drive");
+    night.changed(304_868, "stopping", "ready", "command");
+    let story = night.told(303_000);
+    let story_at = story.about.as_ref().unwrap();
+    assert!(story_at.text.contains("running to stopping"), "{story:?}");
+    assert!(story.why(Certainty::Likely).contains("ramp stop of all 7 drives by anonymous"), "{story:?}");
+    assert!(story.why(Certainty::Seen).contains("what followed was done for bert"), "{story:?}");
+    assert!(!story.why(Certainty::NotKnown).contains("which of them it was is not known"), "{story:?}");
 }
