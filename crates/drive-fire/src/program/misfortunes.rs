@@ -71,8 +71,7 @@ fn killed(plant: &mut Plant, rng: &mut Source) -> Result<(), String> {
     let (ran, mut was_seen) = (rng.u8(..4) > 0, false);
     if ran {
         // By the one who may start: whoever comes over HTTP without a token may not.
-        let asked =
-            r#"{"id": "desk", "action": "start", "direction": "forward", "setpoint": {"frequency_hz": 20}}"#;
+        let asked = r#"{"id": "desk", "action": "start", "direction": "forward", "setpoint": {"frequency_hz": 20}, "expires_in_ms": 9000}"#;
         until("the daemon at its broker", || Ok(plant.broker.has_daemon()))?;
         plant.broker.give(&message("drived/drive/pump_1/command/desk", asked.as_bytes(), None));
         was_seen = rng.u8(..3) > 0;
@@ -113,7 +112,7 @@ fn nothing_is_put_aside(history: &Path) -> Result<(), String> {
 
 /// Nothing more can be opened, while sixty ask to be let in: who is in already stops his motor, and behind it all live on.
 fn without_descriptors(plant: &Plant) -> Result<(), String> {
-    let Some(limit) = plant.highest_descriptor().map(|highest| highest + 1) else { return Ok(()) };
+    let Some(limit) = plant.free_descriptor() else { return Ok(()) };
     if !plant.limit_descriptors(limit) {
         return Err("skipped: prlimit is not there".to_owned());
     }
@@ -139,9 +138,11 @@ fn with_a_full_disk(plant: &Plant) -> Result<(), String> {
     let wrote = file.write(&[0x55]).is_ok();
     // Some looks at each drive are kept meanwhile, or are not.
     thread::sleep(Duration::from_secs(4));
-    let full = doors::lives(&own).and_then(|()| mqtt::answers(&own.broker)).and_then(|()| {
+    // A stop is taken once nothing at all can be written down any more.
+    let full =
         until("that nothing is done of which nobody can write", || refuses_what_cannot_be_written(&own))
-    });
+            .and_then(|()| doors::lives(&own))
+            .and_then(|()| mqtt::answers(&own.broker));
     drop(file);
     let _ = fs::remove_file(&filler);
     full?;

@@ -1,6 +1,7 @@
 //! A daemon over simulated drives, in a folder of its own; both are ended with it.
 
 use std::{
+    collections::BTreeSet,
     fs::{self, File},
     io::{self, Read as _, Write as _},
     net::{TcpListener, TcpStream},
@@ -181,10 +182,12 @@ impl Plant {
         Some(self.process()?.join("root").join(below)).filter(|_| self.disk == Disk::Small)
     }
 
-    /// The highest number of what the daemon has open.
-    pub(super) fn highest_descriptor(&self) -> Option<u64> {
+    /// The least number of which the daemon has nothing open: with that as its limit it opens nothing more.
+    pub(super) fn free_descriptor(&self) -> Option<u64> {
         let open = fs::read_dir(self.process()?.join("fd")).ok()?;
-        open.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok()).max()
+        let open: BTreeSet<u64> =
+            open.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok()).collect();
+        (0..).find(|number| !open.contains(number))
     }
 
     /// From now on the daemon may have no descriptor of this number or above. False: nobody can say so here.

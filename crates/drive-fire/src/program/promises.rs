@@ -40,7 +40,10 @@ const PROMISES: [Promise; 13] = [
     ("what may come again has a name", |plant| {
         plant.broker.forget();
         plant.broker.give(&message("drived/drive/fan/set/frequency/desk", b"25", Some(7)));
-        let first = told(&plant.broker, |said| said.topic.ends_with("/fan/outcome"))?;
+        // What was asked before may be told meanwhile: that is a stop.
+        let is_it =
+            |said: &Said| said.topic.ends_with("/fan/outcome") && !said.text.contains("\"action\":\"stop\"");
+        let first = told(&plant.broker, is_it)?;
         if first.text.contains("\"id_needed\"") { Ok(()) } else { Err(first.text) }
     }),
     ("what is old is not done", |plant| {
@@ -70,6 +73,9 @@ const PROMISES: [Promise; 13] = [
     }),
     ("the same command is done once", |plant| {
         let (one, other) = (super::mqtt::id(), super::mqtt::id());
+        // Nothing is set while a stop is under way.
+        until(|| is_taken(&plant.broker, by_the_desk).is_ok())
+            .map_err(|()| "no setpoint is taken".to_owned())?;
         for (id, hertz) in [(&one, 20), (&other, 30), (&one, 20)] {
             plant.broker.forget();
             let asked = setpoint(id, hertz, ", \"expires_in_ms\": 9000");

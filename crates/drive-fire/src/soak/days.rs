@@ -76,7 +76,8 @@ impl Days {
         }
     }
 
-    fn ends(&mut self, fleet: &Fleet, config: &LineConfig, memory: Option<u64>) {
+    /// A day is over, or all is.
+    pub(super) fn ends(&mut self, fleet: &Fleet, config: &LineConfig, memory: Option<u64>) {
         self.days += 1;
         let counters: Vec<_> = fleet.drives().iter().map(|drive| drive.snapshot().counters).collect();
         let [polls, answered, lost, trips, saves] = [
@@ -96,10 +97,11 @@ impl Days {
         let wait = stats.map(|of| of.class(Class::Stop).wait.max()).max().unwrap_or_default();
         let ((queued, drives), oldest) = (self.queued, self.oldest);
         let line = format!(
-            "day {}: {} KiB; at the most {queued} of {} requests waited for a line; a status was {:.1} s old, {} s is a find; a stop waited \
+            "day {}, after {:.1} h: {} KiB; at the most {queued} of {} requests waited for a line; a status was {:.1} s old, {} s is a find; a stop waited \
              {:.2} s for its line, {:.2} s where no other stop does; {answered} of {polls} statuses came, {lost} losses, {trips} trips, \
              {saves} saves",
             self.days,
+            (self.looked - self.begun).as_secs_f64() / 3_600.0,
             memory.unwrap_or_default(),
             OF_EACH * drives,
             oldest.as_secs_f64(),

@@ -183,6 +183,7 @@ async fn live(
         }
     }
     let lived = begun.elapsed();
+    days.ends(&fleet, &config, memory());
     // All is well again, and everything stops.
     for (_, simulated) in &sites {
         simulated.set_faults(Faults::default());
