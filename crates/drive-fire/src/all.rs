@@ -74,7 +74,7 @@ const PARTS: [Part; 9] = [
     ("fuzz", 30, |turn| {
         let of_each = Duration::from_secs(30) / fuzz::Target::ALL.len() as u32;
         let tried = vec![fuzz::run(&fuzz::Target::ALL, turn.seed, of_each, turn.go_on())];
-        Ok((tried, if turn.is_first { fuzz::hunts(turn.seed) } else { Vec::new() }))
+        Ok((tried, if turn.is_first { fuzz::hunts(turn.seed, fuzz::ORDERS, None) } else { Vec::new() }))
     }),
     ("program", 25, |turn| {
         let program = env::current_exe()?.with_file_name("drived");

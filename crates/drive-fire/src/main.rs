@@ -65,9 +65,13 @@ enum Part {
         /// One execution by the bytes of a file, whoever has chosen them.
         #[arg(long, requires = "target", conflicts_with = "execution")]
         bytes: Option<PathBuf>,
-        /// Against its planted defects; those in the line and the fleet need `--features plants`.
+        /// Against its planted defects, or those that orders of events to one target are to find; those in the line and the fleet need
+        /// `--features plants`.
         #[arg(long)]
         plants: bool,
+        /// Each wrong line of the line and the fleet is hunted by so many orders of events.
+        #[arg(long, default_value_t = fuzz::ORDERS)]
+        orders: u64,
     },
     /// The built program from outside: its doors, and files that were changed.
     Program {
@@ -83,9 +87,10 @@ enum Part {
         /// One execution alone, as a find names it.
         #[arg(long, requires = "target")]
         execution: Option<u64>,
-        /// Whether what a wrong program would say is taken for wrong.
-        #[arg(long)]
-        plants: bool,
+        /// Whether what a wrong program would say is taken for wrong; with `--features plants` wrong lines in the program as well, all or
+        /// those of a target, or one by its name.
+        #[arg(long, num_args = 0..=1, default_missing_value = "")]
+        plants: Option<String>,
         /// Its gateway beside this mbusd, for so many seconds.
         #[arg(long)]
         mbusd: Option<PathBuf>,
@@ -191,6 +196,21 @@ fn found_nothing(told: &[Told]) -> ExitCode {
     if told.iter().all(|told| told.finds.is_empty()) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
+/// What is given to the judge, and where the program has them its wrong lines.
+fn program_plants(
+    program: Option<&Path>,
+    only: Option<&str>,
+    go_on: impl FnMut() -> bool,
+) -> io::Result<Vec<Told>> {
+    let mut told = if only.is_none() { vec![program::find_plants()] } else { Vec::new() };
+    if cfg!(feature = "plants") {
+        let beside = || Ok(env::current_exe()?.with_file_name("drived"));
+        let program = program.map_or_else(beside, |path: &Path| Ok::<_, io::Error>(path.to_owned()))?;
+        told.push(program::find_plants_in(&program, only, go_on));
+    }
+    Ok(told)
+}
+
 fn main() -> ExitCode {
     let Arguments { part, seed, minutes } = Arguments::parse();
     let end = minutes.map(|minutes| Instant::now() + Duration::from_secs(60 * minutes));
@@ -223,14 +243,18 @@ fn main() -> ExitCode {
             vec![matrix::find_plants(seed, of_each as usize, only)]
         }
         Part::Matrix { of_each, .. } => vec![matrix::run(seed, of_each, go_on)],
-        Part::Fuzz { plants: true, .. } => fuzz::hunts(seed),
-        Part::Fuzz { target, execution, bytes, seconds, .. } => {
+        Part::Fuzz { target, execution, bytes, seconds, plants, orders } => {
             let known =
                 |name: &String| fuzz::Target::ALL.into_iter().find(|known| format!("{known:?}") == *name);
             let only = target.as_ref().and_then(known);
             if target.is_some() && only.is_none() {
                 eprintln!("it is none of {:?}", fuzz::Target::ALL);
                 return ExitCode::FAILURE;
+            }
+            if plants {
+                let told = fuzz::hunts(seed, orders, only);
+                told.iter().for_each(|told| print!("{told}"));
+                return found_nothing(&told);
             }
             let once = match (only, execution, bytes.map(fs::read).transpose()) {
                 (_, _, Err(error)) => return ended(Err(error)),
@@ -245,7 +269,13 @@ fn main() -> ExitCode {
             let targets = only.map_or(fuzz::Target::ALL.to_vec(), |only| vec![only]);
             vec![fuzz::run(&targets, seed, Duration::from_secs(seconds), go_on)]
         }
-        Part::Program { plants: true, .. } => vec![program::find_plants()],
+        Part::Program { plants: Some(only), program, .. } => {
+            let only = Some(&*only).filter(|only| !only.is_empty());
+            match program_plants(program.as_deref(), only, go_on) {
+                Ok(told) => told,
+                Err(error) => return ended(Err(error)),
+            }
+        }
         Part::Program { program, seconds, target, execution, mbusd, .. } => {
             let known =
                 |name: &String| program::Target::ALL.into_iter().find(|known| format!("{known:?}") == *name);

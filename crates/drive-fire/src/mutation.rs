@@ -1,5 +1,6 @@
 //! Mutants that a variable chooses, against the tests of the crate in which they stand. `mutants.txt` says of each which promise it
-//! breaks and by which test it dies, or why it lives; whatever is not so any more is found.
+//! breaks and by which test it dies, or why it lives; whatever is not so any more is found. Some are found by no test and by the part
+//! that attacks the built program from outside: they have its target there.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -18,7 +19,16 @@ use crate::{
 const LIST: &str = include_str!("../mutants.txt");
 
 /// The crates in which mutants stand.
-const PACKAGES: [&str; 3] = ["drive-bus", "drive-fleet", "drived-doors"];
+const PACKAGES: [&str; 8] = [
+    "drive-bus",
+    "drive-fleet",
+    "drived-broker",
+    "drived-daemon",
+    "drived-doors",
+    "drived-gateway",
+    "drived-history",
+    "drived-plant",
+];
 
 /// No test of one mutant takes so long, all tests of a library neither.
 const LONGEST: Duration = Duration::from_secs(120);
@@ -48,9 +58,12 @@ pub enum Fate {
     },
     /// No test of its crate falls; why that is borne.
     Lives(String),
+    /// The part `program` finds it, by this target.
+    FoundBy(String),
 }
 
-/// The rows of a list: `crate | name | promise | target | test`, or `lives` and the reason in the place of the last two.
+/// The rows of a list: `crate | name | promise | target | test`; `lives` and the reason, or `program` and its target, in the place of the
+/// last two.
 ///
 /// # Errors
 /// The first line that is none.
@@ -62,6 +75,7 @@ pub fn read(list: &str) -> Result<Vec<Row>, String> {
         };
         let fate = match target {
             "lives" => Fate::Lives(last.to_owned()),
+            "program" => Fate::FoundBy(last.to_owned()),
             target => Fate::DiesBy { target: target.to_owned(), test: last.to_owned() },
         };
         Ok(Row { package: package.to_owned(), name: name.to_owned(), breaks: breaks.to_owned(), fate })
@@ -112,8 +126,12 @@ pub fn at_lines(root: &Path) -> io::Result<BTreeSet<(String, String)>> {
     Ok(found)
 }
 
-/// These test programs of the crates, with all mutants in them: `drive-fleet` is the library's, `order` that of a file.
-fn programs(root: &Path, targets: &BTreeSet<String>) -> io::Result<BTreeMap<String, PathBuf>> {
+/// These test programs of these crates, with all mutants in them: `drive-fleet` is the library's, `order` that of a file.
+fn programs(
+    root: &Path,
+    packages: &BTreeSet<String>,
+    targets: &BTreeSet<String>,
+) -> io::Result<BTreeMap<String, PathBuf>> {
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
     // Together with this crate, so that what it was built with is not built once more.
@@ -126,7 +144,7 @@ fn programs(root: &Path, targets: &BTreeSet<String>) -> io::Result<BTreeMap<Stri
         "drive-fire",
         "--lib",
     ]);
-    for package in PACKAGES {
+    for package in packages {
         command.args(["-p", package]);
     }
     for target in targets.iter().filter(|target| !PACKAGES.contains(&target.as_str())) {
@@ -184,15 +202,17 @@ struct Ran {
 pub fn run(root: &Path, behind: usize, mut go_on: impl FnMut() -> bool) -> io::Result<Told> {
     let begun = Instant::now();
     let mut told = Told::new("mutants, against the tests that own their promise", "mutants");
-    let rows: Vec<Row> = list().into_iter().skip(behind).collect();
+    let is_of_tests = |row: &Row| !matches!(row.fate, Fate::FoundBy(_));
+    let rows: Vec<Row> = list().into_iter().filter(is_of_tests).skip(behind).collect();
     if rows.is_empty() {
         return Ok(told);
     }
     let targets = rows.iter().filter_map(|row| match &row.fate {
         Fate::DiesBy { target, .. } => Some(target.clone()),
-        Fate::Lives(_) => None,
+        Fate::Lives(_) | Fate::FoundBy(_) => None,
     });
-    let programs = programs(root, &targets.collect())?;
+    let packages = rows.iter().map(|row| row.package.clone()).collect();
+    let programs = programs(root, &packages, &targets.collect())?;
     let mut lives = 0;
     for row in rows {
         if !go_on() {
@@ -201,14 +221,14 @@ pub fn run(root: &Path, behind: usize, mut go_on: impl FnMut() -> bool) -> io::R
         told.count += 1;
         let target = match &row.fate {
             Fate::DiesBy { target, .. } => target,
-            Fate::Lives(_) => &row.package,
+            Fate::Lives(_) | Fate::FoundBy(_) => &row.package,
         };
         let Some(program) = programs.get(target) else {
             return Err(io::Error::other(format!("{target} is no test program: {:?}", programs.keys())));
         };
         let arguments = match &row.fate {
             Fate::DiesBy { test, .. } => vec!["--exact", test],
-            Fate::Lives(_) => Vec::new(),
+            Fate::Lives(_) | Fate::FoundBy(_) => Vec::new(),
         };
         let began = Instant::now();
         let Ran { died, ended, said } = test(root, &row, program, &arguments)?;
@@ -237,7 +257,7 @@ pub fn run(root: &Path, behind: usize, mut go_on: impl FnMut() -> bool) -> io::R
                     replay,
                 });
             }
-            Fate::Lives(why) => {
+            Fate::Lives(why) | Fate::FoundBy(why) => {
                 lives += 1;
                 told.plants.push(Plant { name: format!("{name}: {why}"), found_by: None });
             }
@@ -256,10 +276,17 @@ fn by_package(told: &Told, rows: &[Row]) -> Vec<(&'static str, String)> {
     let died =
         |row: &&Row| told.plants.iter().any(|plant| plant.name == row.name && plant.found_by.is_some());
     let of = |package: &'static str| {
-        let of_package = rows.iter().filter(|row| row.package == package);
+        let is_of_tests = |row: &&Row| row.package == package && !matches!(row.fate, Fate::FoundBy(_));
+        let of_package = rows.iter().filter(is_of_tests);
         (package, format!("{} of {} die", of_package.clone().filter(died).count(), of_package.count()))
     };
-    PACKAGES.into_iter().map(of).collect()
+    PACKAGES
+        .into_iter()
+        .filter(|package| {
+            rows.iter().any(|row| row.package == *package && !matches!(row.fate, Fate::FoundBy(_)))
+        })
+        .map(of)
+        .collect()
 }
 
 /// The tests that fell, as libtest names them.
@@ -282,7 +309,7 @@ pub fn hunt(root: &Path, only: Option<&str>) -> io::Result<()> {
         .collect();
     for package in PACKAGES.iter().filter(|package| wanted.iter().any(|(of, _)| of == *package)) {
         let files = files(root, package)?;
-        let programs = programs(root, &files)?;
+        let programs = programs(root, &BTreeSet::from([(*package).to_owned()]), &files)?;
         // The library's tests first, then those that stand in files of the same crate.
         let targets: Vec<&str> = [*package].into_iter().chain(files.iter().map(String::as_str)).collect();
         for (_, name) in wanted.iter().filter(|(of, _)| of == package) {
@@ -312,10 +339,11 @@ mod tests {
     #[test]
     fn a_line_of_the_list_is_read_and_one_that_is_none_is_refused() {
         let rows =
-            read("# of the line\n\ndrive-bus | a | b c | order | d\ndrive-bus | e | f | lives | why\n")
+            read("# of the line\n\ndrive-bus | a | b c | order | d\ndrive-bus | e | f | lives | why\nx | g | h | program | Mqtt\n")
                 .unwrap();
         assert_eq!(rows[0].fate, Fate::DiesBy { target: "order".to_owned(), test: "d".to_owned() });
         assert_eq!(rows[1].fate, Fate::Lives("why".to_owned()));
+        assert_eq!(rows[2].fate, Fate::FoundBy("Mqtt".to_owned()));
         assert!(read("drive-bus | a").is_err());
     }
 

@@ -379,6 +379,9 @@ impl Entrance {
                     if failed.is_power_of_two() {
                         tracing::warn!("{} cannot accept a connection, {failed} in all: {error}", self.name);
                     }
+                    if drive_fleet::mutant!("door-ends-without-descriptors", false, true) {
+                        return;
+                    }
                     sleep(TRIED_AGAIN).await;
                     continue;
                 }

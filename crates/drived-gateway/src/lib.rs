@@ -100,6 +100,9 @@ async fn accept_all(listener: &TcpListener, desk: &Arc<Desk>, mut ended: watch::
                     if failed.is_power_of_two() {
                         tracing::warn!("gateway {name} cannot accept a connection, {failed} in all: {error}");
                     }
+                    if drive_fleet::mutant!("gateway-ends-without-descriptors", false, true) {
+                        return;
+                    }
                     sleep(TRIED_AGAIN).await;
                     continue;
                 }

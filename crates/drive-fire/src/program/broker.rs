@@ -1,10 +1,11 @@
 //! A broker of MQTT v5 that only the daemon talks to: it lets it in, grants what it asks for, brings back what it says to itself, keeps
-//! what it has said last, and gives it whatever it is to be given, packets that are none among it (OASIS MQTT 5.0, section 3).
+//! what it has said last, and gives it whatever it is to be given, packets that are none among it (OASIS MQTT 5.0, section 3). What the
+//! README of `drived` says of every connection and every message of the daemon is held here against each of them.
 
 use std::{
     collections::VecDeque,
     io::{self, Read, Write},
-    net::{TcpListener, TcpStream},
+    net::{Shutdown, TcpListener, TcpStream},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     thread,
     time::Duration,
@@ -13,12 +14,28 @@ use std::{
 /// What was said last, in so many messages.
 const KEPT: usize = 400;
 
+/// What of a drive holds for a moment, and goes when it is not told again.
+const OF_NOW: [&str; 4] = ["/state", "/measurements", "/fault", "/last_command"];
+/// What happens once, and is nothing for whoever comes later.
+const NEWS: [&str; 3] = ["/outcome", "/event", "/echo"];
+
+/// Something that the daemon has said.
+#[derive(Debug, Clone)]
+pub(super) struct Said {
+    pub(super) topic: String,
+    pub(super) text: String,
+    /// Its Correlation Data.
+    pub(super) correlation: Option<Vec<u8>>,
+}
+
 #[derive(Default)]
 struct Shared {
     /// To the daemon, while it is connected and has subscribed.
     daemon: Option<TcpStream>,
-    said: VecDeque<(String, String)>,
-    /// What it said that has no form.
+    said: VecDeque<Said>,
+    /// What it says to itself is not brought back.
+    holds_echoes: bool,
+    /// What it said that has no form, or not the one that it is to have.
     wrong: Option<String>,
 }
 
@@ -59,13 +76,29 @@ impl Broker {
         shared.daemon.as_mut().is_some_and(|daemon| daemon.write_all(bytes).is_ok())
     }
 
-    /// Whether the daemon has told this on a topic that ends so.
-    pub(super) fn was_told(&self, topic: &str, text: &str) -> bool {
-        let shared = locked(&self.shared);
-        shared.said.iter().any(|(at, said)| at.ends_with(topic) && said.contains(text))
+    /// The first that the daemon has said of this kind.
+    pub(super) fn first(&self, is_it: impl Fn(&Said) -> bool) -> Option<Said> {
+        locked(&self.shared).said.iter().find(|said| is_it(said)).cloned()
     }
 
-    /// What it said that has no form.
+    /// What it has said until now is forgotten.
+    pub(super) fn forget(&self) {
+        locked(&self.shared).said.clear();
+    }
+
+    /// Whether what the daemon says to itself comes back to it.
+    pub(super) fn hold_echoes(&self, holds: bool) {
+        locked(&self.shared).holds_echoes = holds;
+    }
+
+    /// The connection to the daemon is lost.
+    pub(super) fn lose(&self) {
+        if let Some(daemon) = locked(&self.shared).daemon.take() {
+            let _ = daemon.shutdown(Shutdown::Both);
+        }
+    }
+
+    /// What it said that has no form, or not the one that it is to have.
     pub(super) fn wrong(&self) -> Option<String> {
         locked(&self.shared).wrong.clone()
     }
@@ -79,7 +112,13 @@ fn serve(mut stream: TcpStream, shared: &Mutex<Shared>) -> io::Result<()> {
         let mut answers = Vec::new();
         match (kind >> 4, body.as_slice()) {
             // CONNECT, SUBSCRIBE, PINGREQ, DISCONNECT.
-            (1, _) => answers.extend([0x20, 3, 0, 0, 0]),
+            (1, _) => {
+                // Behind the name and the version: a will, which is kept (section 3.1.2.3).
+                if body.get(7).is_none_or(|flags| flags & 0x24 != 0x24) {
+                    wrong(shared, "CONNECT with a will that is kept", &body)?;
+                }
+                answers.extend([0x20, 3, 0, 0, 0]);
+            }
             (8, [a, b, rest @ ..]) => {
                 let Some(filters) = filters(rest) else { return wrong(shared, "SUBSCRIBE", &body) };
                 let granted = vec![1; filters];
@@ -89,17 +128,25 @@ fn serve(mut stream: TcpStream, shared: &Mutex<Shared>) -> io::Result<()> {
             (12, _) => answers.extend([0xD0, 0]),
             (14, _) => return Ok(()),
             (3, _) => {
-                let Some((topic, id, payload)) = publish(kind, &body) else {
+                let Some(Published { said, id, payload, expires }) = publish(kind, &body) else {
                     return wrong(shared, "PUBLISH", &body);
                 };
+                let is_of = |topics: &[&str]| topics.iter().any(|topic| said.topic.ends_with(topic));
+                let is_kept = kind & 1 == 1 && !payload.is_empty();
+                if is_kept && is_of(&NEWS) {
+                    wrong(shared, "news that are not kept", &body)?;
+                }
+                if is_kept && is_of(&OF_NOW) && !expires {
+                    wrong(shared, "state that expires", &body)?;
+                }
                 if let Some([a, b]) = id {
                     answers.extend([0x40, 2, a, b]);
                 }
-                if topic.ends_with("/echo") {
-                    answers.extend(message(&topic, &payload, None));
-                }
                 let mut shared = locked(shared);
-                shared.said.push_back((topic, String::from_utf8_lossy(&payload).into_owned()));
+                if said.topic.ends_with("/echo") && !shared.holds_echoes {
+                    answers.extend(message(&said.topic, &payload, None));
+                }
+                shared.said.push_back(said);
                 let more = shared.said.len().saturating_sub(KEPT);
                 shared.said.drain(..more);
             }
@@ -165,8 +212,15 @@ fn filters(bytes: &[u8]) -> Option<usize> {
     Some(filters)
 }
 
-/// Topic, identifier and payload of a PUBLISH.
-fn publish(kind: u8, body: &[u8]) -> Option<(String, Option<[u8; 2]>, Vec<u8>)> {
+/// A PUBLISH.
+struct Published {
+    said: Said,
+    id: Option<[u8; 2]>,
+    payload: Vec<u8>,
+    expires: bool,
+}
+
+fn publish(kind: u8, body: &[u8]) -> Option<Published> {
     let (topic, mut rest) = counted(body)?;
     let id = if kind & 0x06 == 0 {
         None
@@ -176,8 +230,33 @@ fn publish(kind: u8, body: &[u8]) -> Option<(String, Option<[u8; 2]>, Vec<u8>)> 
         Some([*a, *b])
     };
     let (len, rest) = number(rest)?;
-    let payload = rest.get(len..)?.to_vec();
-    Some((String::from_utf8(topic.to_vec()).ok()?, id, payload))
+    let (own, payload) = rest.split_at_checked(len)?;
+    let (expires, correlation) = properties(own)?;
+    let topic = String::from_utf8(topic.to_vec()).ok()?;
+    let said = Said { topic, text: String::from_utf8_lossy(payload).into_owned(), correlation };
+    Some(Published { said, id, payload: payload.to_vec(), expires })
+}
+
+/// Whether it expires, and its Correlation Data (section 2.2.2: format, expiry, content type, response topic, alias, user property).
+fn properties(mut bytes: &[u8]) -> Option<(bool, Option<Vec<u8>>)> {
+    let (mut expires, mut correlation) = (false, None);
+    while let [name, behind @ ..] = bytes {
+        expires |= *name == 0x02;
+        bytes = match name {
+            0x01 => behind.get(1..)?,
+            0x02 => behind.get(4..)?,
+            0x03 | 0x08 => counted(behind)?.1,
+            0x09 => {
+                let (data, behind) = counted(behind)?;
+                correlation = Some(data.to_vec());
+                behind
+            }
+            0x23 => behind.get(2..)?,
+            0x26 => counted(counted(behind)?.1)?.1,
+            _ => return None,
+        };
+    }
+    Some((expires, correlation))
 }
 
 fn framed(kind: u8, body: &[u8]) -> Vec<u8> {

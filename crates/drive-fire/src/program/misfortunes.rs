@@ -8,13 +8,16 @@ use std::{
     path::{Path, PathBuf},
     process::{Command, Stdio},
     thread,
-    time::{Duration, Instant},
+    time::{Duration, Instant, SystemTime},
 };
+
+use chrono::{DateTime, SecondsFormat, Utc};
 
 use super::{
     broker::message,
     doors, judge, mqtt,
     plant::{Disk, Plant},
+    promises,
 };
 use crate::{child, fuzz::Source};
 
@@ -65,14 +68,14 @@ fn shows(plant: &Plant, state: &str) -> Result<bool, String> {
 /// Whatever the kill fell into, a run of before is stopped by whoever comes after, and nothing runs that stood.
 #[allow(clippy::disallowed_methods, reason = "nothing asynchronous stands here")]
 fn killed(plant: &mut Plant, rng: &mut Source) -> Result<(), String> {
-    let ran = rng.u8(..4) > 0;
+    let (ran, mut was_seen) = (rng.u8(..4) > 0, false);
     if ran {
         // By the one who may start: whoever comes over HTTP without a token may not.
-        let asked =
-            r#"{"id": "desk", "action": "start", "direction": "forward", "setpoint": {"frequency_hz": 20}}"#;
+        let asked = r#"{"id": "desk", "action": "start", "direction": "forward", "setpoint": {"frequency_hz": 20}, "expires_in_ms": 9000}"#;
         until("the daemon at its broker", || Ok(plant.broker.has_daemon()))?;
         plant.broker.give(&message("drived/drive/pump_1/command/desk", asked.as_bytes(), None));
-        if rng.u8(..3) > 0 {
+        was_seen = rng.u8(..3) > 0;
+        if was_seen {
             until("a motor that runs", || shows(plant, "running"))?;
         }
     }
@@ -83,20 +86,38 @@ fn killed(plant: &mut Plant, rng: &mut Source) -> Result<(), String> {
     if !ran {
         doors::nothing_moves(plant)?;
     }
+    if was_seen {
+        // What was kept before it was given is known again: a motor that still runs is its own, and is told so.
+        until("that it is its own", || {
+            let events = request(plant, "GET /api/v1/events/recent", "")?;
+            Ok(events.contains("\"event\":\"run_adopted\"") || !shows(plant, "running")?)
+        })?;
+    }
     request(plant, "POST /api/v1/drives/pump%201/stop?wait=30s", "{}")?;
     until("standstill behind a stop", || Ok(!shows(plant, "running")? && !shows(plant, "stopping")?))?;
     doors::lives(plant)?;
     can_be_read(plant)
 }
 
-/// Nothing more can be opened, while thirty ask to be let in: who is in already stops his motor, and behind it all live on.
+/// What was sound stands where it stood: nobody has begun it anew.
+fn nothing_is_put_aside(history: &Path) -> Result<(), String> {
+    let folder = history.parent().ok_or("it has no folder")?;
+    let names = fs::read_dir(folder).map_err(|error| error.to_string())?;
+    let names = names.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+    match names.into_iter().find(|name| name.contains(".damaged-")) {
+        Some(name) => Err(format!("what was sound was put aside: {name}")),
+        None => Ok(()),
+    }
+}
+
+/// Nothing more can be opened, while sixty ask to be let in: who is in already stops his motor, and behind it all live on.
 fn without_descriptors(plant: &Plant) -> Result<(), String> {
-    let Some(limit) = plant.highest_descriptor().map(|highest| highest + 1) else { return Ok(()) };
+    let Some(limit) = plant.free_descriptor() else { return Ok(()) };
     if !plant.limit_descriptors(limit) {
         return Err("skipped: prlimit is not there".to_owned());
     }
-    let waiting: Vec<_> =
-        (0..30).filter_map(|_| TcpStream::connect(("127.0.0.1", plant.http)).ok()).collect();
+    let ports = [plant.http, plant.gateway].into_iter().cycle().take(60);
+    let waiting: Vec<_> = ports.filter_map(|port| TcpStream::connect(("127.0.0.1", port)).ok()).collect();
     let stopped = mqtt::answers(&plant.broker);
     drop(waiting);
     plant.limit_descriptors(DESCRIPTORS);
@@ -117,22 +138,42 @@ fn with_a_full_disk(plant: &Plant) -> Result<(), String> {
     let wrote = file.write(&[0x55]).is_ok();
     // Some looks at each drive are kept meanwhile, or are not.
     thread::sleep(Duration::from_secs(4));
-    let full = doors::lives(&own).and_then(|()| mqtt::answers(&own.broker));
+    // A stop is taken once nothing at all can be written down any more.
+    let full =
+        until("that nothing is done of which nobody can write", || refuses_what_cannot_be_written(&own))
+            .and_then(|()| doors::lives(&own))
+            .and_then(|()| mqtt::answers(&own.broker));
     drop(file);
     let _ = fs::remove_file(&filler);
     full?;
     if wrote {
         return Err("the disk was not full".to_owned());
     }
+    let from = SystemTime::now() + Duration::from_secs(1);
     until("life", || doors::lives(&own).map(|()| true))?;
     judge::log(&own.log())?;
+    let taken = || promises::is_taken(&own.broker, promises::by_the_desk).map(|()| true);
+    until("a command that can be written down", taken)?;
+    let audit = fs::read_to_string(disk.join("audit")).map_err(|error| format!("the audit log: {error}"))?;
+    if !audit.contains("\"kind\":\"gap\"") {
+        return Err("the audit log does not say that something is missing".to_owned());
+    }
     // By its own name nobody outside of its name space finds it: a copy, with what waits to be written into it.
     let history = find(&disk).ok_or("no history is kept behind it")?;
+    nothing_is_put_aside(&history)?;
     let copy = plant.folder.join("behind-a-full-disk.sqlite");
-    for (from, to) in [(history.clone(), copy.clone()), (log_of(&history), log_of(&copy))] {
-        fs::copy(&from, to).map_err(|error| format!("{}: {error}", from.display()))?;
-    }
-    reads(plant, &copy)
+    until("what happened behind it", || {
+        for (from, to) in [(history.clone(), copy.clone()), (log_of(&history), log_of(&copy))] {
+            fs::copy(&from, to).map_err(|error| format!("{}: {error}", from.display()))?;
+        }
+        doors::lives(&own)?;
+        Ok(!reads(plant, "fan", from, &copy)?.contains("nothing is recorded of that time"))
+    })
+}
+
+/// A page that was begun has room for some more lines: what is refused by then is refused for want of room.
+fn refuses_what_cannot_be_written(plant: &Plant) -> Result<bool, String> {
+    promises::is_refused(&plant.broker, "\"audit\"", promises::by_the_desk).map(|()| true)
 }
 
 /// Where SQLite keeps what is to be written into this file.
@@ -160,16 +201,19 @@ pub(super) fn find(folder: &Path) -> Option<PathBuf> {
 /// What the black box has of before the kill is read by its tool.
 fn can_be_read(plant: &Plant) -> Result<(), String> {
     let history = find(&plant.folder.join("state")).ok_or("no history is kept")?;
-    reads(plant, &history)
+    nothing_is_put_aside(&history)?;
+    reads(plant, "pump 1", SystemTime::UNIX_EPOCH, &history).map(drop)
 }
 
-fn reads(plant: &Plant, history: &Path) -> Result<(), String> {
+/// What is told of a drive from then on.
+fn reads(plant: &Plant, drive: &str, from: SystemTime, history: &Path) -> Result<String, String> {
+    let from = DateTime::<Utc>::from(from).to_rfc3339_opts(SecondsFormat::Secs, true);
     let mut tool = plant.tool();
-    tool.args(["history", "pump 1", "--from", "2020-01-01 00:00", "--file"]).arg(history);
+    tool.args(["history", drive, "--from", &from, "--file"]).arg(history);
     let ended = child::run(&mut tool, Duration::from_secs(20)).map_err(|error| error.to_string())?;
     judge::tool(&ended)?;
     match ended.status.and_then(|status| status.code()) {
-        Some(0) => Ok(()),
+        Some(0) => Ok(ended.stdout),
         code => Err(format!("the history is not read, {code:?}: {}", ended.stderr)),
     }
 }

@@ -10,6 +10,8 @@ mod judge;
 mod misfortunes;
 mod mqtt;
 mod plant;
+mod plants;
+mod promises;
 
 use std::{
     collections::BTreeMap,
@@ -19,6 +21,7 @@ use std::{
 };
 
 pub use judge::find_plants;
+pub use plants::find_plants as find_plants_in;
 
 use crate::{
     fuzz::Source,
@@ -90,8 +93,12 @@ pub fn run(
     let before = plant.memory();
     for target in Target::ALL.into_iter().filter(|target| only.is_none_or(|(one, _)| one == *target)) {
         let (began, mut count, mut whys) = (Instant::now(), 0, BTreeMap::new());
-        // Of the misfortunes each comes once at the least.
-        let least = if target == Target::Misfortunes { misfortunes::COUNT } else { 0 };
+        // Of the misfortunes, and of what is promised at a broker, each comes once at the least.
+        let least = match target {
+            Target::Misfortunes => misfortunes::COUNT,
+            Target::Mqtt => mqtt::COUNT,
+            _ => 0,
+        };
         while (began.elapsed() < of_each || count < least) && go_on() && (only.is_none() || count == 0) {
             let number =
                 only.map_or(seed.wrapping_mul(1_000_000_007).wrapping_add(count), |(_, number)| number);
@@ -101,7 +108,7 @@ pub fn run(
                 Target::Http => doors::http(&plant, &mut rng),
                 Target::Gateway => doors::gateway(&plant, &mut rng),
                 Target::Misfortunes => misfortunes::execute(number, &mut plant, &mut rng),
-                Target::Mqtt => mqtt::execute(&plant, &mut rng),
+                Target::Mqtt => mqtt::execute(number, &plant, &mut rng),
                 _ => files.execute(target, &plant, &mut rng),
             };
             // What lives as before is not asked after each.

@@ -9,6 +9,7 @@ use std::{
 use super::{
     broker::{Broker, message, message_with},
     plant::Plant,
+    promises,
 };
 use crate::fuzz::{Source, change};
 
@@ -59,8 +60,16 @@ const PROPERTIES: &[&[u8]] = &[
     b"\x08\x00\x0bdrived/echo",
 ];
 
+/// So many executions have each promise among them.
+pub(super) const COUNT: u64 = 2 * promises::COUNT;
+
+/// One of the promises, or a message that nobody has thought of.
+pub(super) fn execute(number: u64, plant: &Plant, rng: &mut Source) -> Result<(), String> {
+    if number % 2 == 0 { promises::is_kept(number / 2, plant) } else { one_message(plant, rng) }
+}
+
 /// One message, and behind it a stop that is asked for rightly and whose outcome is told.
-pub(super) fn execute(plant: &Plant, rng: &mut Source) -> Result<(), String> {
+fn one_message(plant: &Plant, rng: &mut Source) -> Result<(), String> {
     let broker = &plant.broker;
     until(|| broker.has_daemon()).map_err(|()| "the daemon does not come back to its broker".to_owned())?;
     let mut topic = TOPICS[rng.usize(..TOPICS.len())].as_bytes().to_vec();
@@ -88,25 +97,39 @@ pub(super) fn execute(plant: &Plant, rng: &mut Source) -> Result<(), String> {
     broker.wrong().map_or(Ok(()), Err)
 }
 
+/// A name for a command, which no other has.
+pub(super) fn id() -> String {
+    static NUMBER: AtomicU64 = AtomicU64::new(0);
+    format!("fire-{}", NUMBER.fetch_add(1, Ordering::Relaxed))
+}
+
+/// What a stop of this name says.
+pub(super) fn named(id: &str) -> String {
+    format!("{{\"id\": \"{id}\", \"action\": \"stop\"}}")
+}
+
 /// A stop that is asked for rightly is taken, and its outcome told.
 pub(super) fn answers(broker: &Broker) -> Result<(), String> {
-    static NUMBER: AtomicU64 = AtomicU64::new(0);
-    let id = format!("fire-{}", NUMBER.fetch_add(1, Ordering::Relaxed));
-    let asked = format!("{{\"id\": \"{id}\", \"action\": \"stop\"}}");
-    let mut last = None;
+    let id = id();
+    let (mut last, mut told) = (None, None);
     until(|| {
         // In a flood the same stop is taken once in fifty milliseconds.
         if last.is_none_or(|last: Instant| last.elapsed() > Duration::from_millis(500)) {
-            broker.give(&message("drived/drive/fan/command/hmi", asked.as_bytes(), None));
+            broker.give(&message("drived/drive/fan/command/hmi", named(&id).as_bytes(), None));
             last = Some(Instant::now());
         }
-        broker.was_told("drive/fan/outcome", &id)
+        told = broker.first(|said| promises::is_of(said, &id));
+        told.is_some()
     })
-    .map_err(|()| "no outcome of a stop is told".to_owned())
+    .map_err(|()| "no outcome of a stop is told".to_owned())?;
+    match told.filter(|said| said.text.contains("\"refused\"")) {
+        Some(said) => Err(format!("a stop is refused: {}", said.text)),
+        None => Ok(()),
+    }
 }
 
 #[allow(clippy::disallowed_methods, reason = "nothing asynchronous stands here")]
-fn until(mut is_so: impl FnMut() -> bool) -> Result<(), ()> {
+pub(super) fn until(mut is_so: impl FnMut() -> bool) -> Result<(), ()> {
     let begun = Instant::now();
     while !is_so() {
         if begun.elapsed() > LONGEST {

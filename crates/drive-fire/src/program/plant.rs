@@ -1,6 +1,7 @@
 //! A daemon over simulated drives, in a folder of its own; both are ended with it.
 
 use std::{
+    collections::BTreeSet,
     fs::{self, File},
     io::{self, Read as _, Write as _},
     net::{TcpListener, TcpStream},
@@ -23,6 +24,8 @@ pub(super) struct Plant {
     pub(super) broker: Broker,
     line: Line,
     disk: Disk,
+    /// The wrong line in the daemon.
+    mutant: Option<&'static str>,
     daemon: Option<Child>,
 }
 
@@ -80,24 +83,44 @@ fn free_port() -> io::Result<u16> {
 
 impl Plant {
     pub(super) fn start(program: &Path) -> io::Result<Self> {
+        Self::with_mutant(program, None)
+    }
+
+    /// With this wrong line in the daemon, where the program was built with them all.
+    pub(super) fn with_mutant(program: &Path, mutant: Option<&'static str>) -> io::Result<Self> {
         let folder = std::env::temp_dir().join(format!("drive-fire-{}", std::process::id()));
-        Self::start_in(program, folder, Disk::Usual)
+        Self::start_in(program, folder, Disk::Usual, mutant)
     }
 
     /// Another plant of the same program.
     pub(super) fn another_with(&self, disk: Disk) -> io::Result<Self> {
-        Self::start_in(&self.program, self.folder.join("another-plant"), disk)
+        Self::start_in(&self.program, self.folder.join("another-plant"), disk, self.mutant)
     }
 
-    fn start_in(program: &Path, folder: PathBuf, disk: Disk) -> io::Result<Self> {
+    fn start_in(
+        program: &Path,
+        folder: PathBuf,
+        disk: Disk,
+        mutant: Option<&'static str>,
+    ) -> io::Result<Self> {
         fs::create_dir_all(&folder)?;
         let disk = if disk == Disk::Small && !misfortunes::may_mount() { Disk::Usual } else { disk };
         let line = Line::start(program, folder.join("line"))?;
         let (http, gateway) = (free_port()?, free_port()?);
         let broker = Broker::start()?;
-        let mut plant =
-            Self { program: program.to_owned(), folder, http, gateway, broker, line, disk, daemon: None };
+        let mut plant = Self {
+            program: program.to_owned(),
+            folder,
+            http,
+            gateway,
+            broker,
+            line,
+            disk,
+            mutant,
+            daemon: None,
+        };
         plant.until("the simulated line", |plant| plant.line.path.exists())?;
+        fs::create_dir_all(plant.state())?;
         fs::write(plant.config(), plant.text(&plant.line.path))?;
         File::create(plant.folder.join("log"))?;
         plant.begin()?;
@@ -109,12 +132,12 @@ impl Plant {
         let log = File::options().append(true).open(self.folder.join("log"))?;
         let mut command = self.tool();
         if self.disk == Disk::Small {
-            fs::create_dir_all(self.state())?;
             // Its state lies on a disk of its own, which nobody else sees.
             let script = "mount -t tmpfs -o size=12m none \"$XDG_STATE_HOME\" && exec \"$0\" \"$@\"";
             command = self.with_state(Command::new("unshare"));
             command.args(["--map-root-user", "--mount", "sh", "-c", script]).arg(&self.program);
         }
+        command.envs(self.mutant.map(|mutant| ("DRIVED_MUTANT", mutant)));
         let daemon = command
             .arg("run")
             .arg("--config")
@@ -159,10 +182,12 @@ impl Plant {
         Some(self.process()?.join("root").join(below)).filter(|_| self.disk == Disk::Small)
     }
 
-    /// The highest number of what the daemon has open.
-    pub(super) fn highest_descriptor(&self) -> Option<u64> {
+    /// The least number of which the daemon has nothing open: with that as its limit it opens nothing more.
+    pub(super) fn free_descriptor(&self) -> Option<u64> {
         let open = fs::read_dir(self.process()?.join("fd")).ok()?;
-        open.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok()).max()
+        let open: BTreeSet<u64> =
+            open.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok()).collect();
+        (0..).find(|number| !open.contains(number))
     }
 
     /// From now on the daemon may have no descriptor of this number or above. False: nobody can say so here.
@@ -189,7 +214,7 @@ impl Plant {
     fn text(&self, line: &Path) -> String {
         let (Self { http, gateway, .. }, mqtt) = (self, self.broker.port);
         format!(
-            "snapshots = \"1s\"\n[http]\nlisten = \"127.0.0.1:{http}\"\n[defaults]\ncontrol = true\n\
+            "snapshots = \"1s\"\naudit = \"{}\"\n[http]\nlisten = \"127.0.0.1:{http}\"\n[defaults]\ncontrol = true\n\
              watchdog = {{ time = \"10s\", reaction = \"ramp\" }}\n[lines.bench]\nport = \"{},19200,8E1\"\n\
              [[drives]]\nline = \"bench\"\ndrive = \"atv312@1-2\"\nname = \"pump {{}}\"\n\
              [[drives]]\nline = \"bench\"\ndrive = \"atv21@5\"\nname = \"fan\"\n\
@@ -197,6 +222,7 @@ impl Plant {
              [[gateways]]\nlisten = \"127.0.0.1:{gateway}\"\nwrites = \"stop\"\nvirtual_unit = 247\nmax_age = \"10s\"\n\
              [mqtt]\nservers = [\"mqtt://127.0.0.1:{mqtt}\"]\ncommands = true\ndiscovery = \"device\"\n\
              [mqtt.commanders]\nhmi = \"stop\"\npanel = \"stop\"\ndesk = \"operate\"\n[history]\n",
+            self.state().join("audit").display(),
             line.display()
         )
     }
@@ -209,6 +235,7 @@ impl Plant {
     fn with_state(&self, mut command: Command) -> Command {
         command
             .env_remove("DRIVED_LOG")
+            .env_remove("DRIVED_MUTANT")
             .env("RUST_BACKTRACE", "0")
             .env_remove("RUNTIME_DIRECTORY")
             .env("XDG_RUNTIME_DIR", &self.folder)

@@ -60,7 +60,8 @@ impl Counter {
     pub(super) async fn work<A: Answers + Sync>(self: Arc<Self>, mut orders: mpsc::Receiver<Order<A>>) {
         while let Some(order) = orders.recv().await {
             let (caller, record, answers, named) = order.head();
-            if let Err(error) = self.audit.record(record.clone()).done().await {
+            let written = self.audit.record(record.clone()).done().await;
+            if let Err(error) = drive_fleet::mutant!("unwritten-command-moves", written, written.or(Ok(()))) {
                 self.refuse(caller, record.clone(), answers, named, Refusal::Audit(error.to_string()));
                 continue;
             }

@@ -111,7 +111,7 @@ impl<A: Answers + Sync> Desk<A> {
     pub fn take(&mut self, mut message: Message<A>) {
         let stop = message.said.stops();
         let in_time = self.is_in_time(std::mem::take(&mut message.pace_of), message.arrived);
-        if !in_time && stop.is_none() {
+        if !in_time && drive_fleet::mutant!("stop-lost-in-a-flood", stop.is_none(), true) {
             // Nothing of a flood reaches the audit log, which is there for everybody.
             return;
         }
@@ -123,7 +123,9 @@ impl<A: Answers + Sync> Desk<A> {
         let Some(target) = message.target.take() else {
             return self.counter.refuse(&caller, record, &answers, named, Refusal::NotFound);
         };
-        if let Some(order) = stop {
+        let is_doubted = drive_fleet::mutant!("stop-of-a-broker-is-doubted", false, message.doubt.is_some());
+        let waits = drive_fleet::mutant!("stop-of-a-broker-waits-for-the-disk", false, true);
+        if let Some(order) = stop.filter(|_| !is_doubted && !waits) {
             let key = (target.clone(), order);
             if !in_time && self.stopped.get(&key).is_some_and(|at| arrived < *at + SAME_STOP) {
                 return;
@@ -160,7 +162,7 @@ impl<A: Answers + Sync> Desk<A> {
         }
         let Said { asked, issued_unix_ms, .. } = message.said;
         let asked = asked?;
-        if target == Target::All {
+        if drive_fleet::mutant!("all-are-commanded", target == Target::All, false) {
             return Err(Refusal::malformed("all drives can be stopped together, and nothing else"));
         }
         let says_itself = asked.expires_in_ms.is_some();
@@ -175,7 +177,7 @@ impl<A: Answers + Sync> Desk<A> {
         // Its time has run since it was sent; and the same command is the same again, whenever it comes.
         let age = judge_time([message.sent_unix_ms, issued_unix_ms], message.arrived, request.lifetime)?;
         request.arrived = request.arrived.checked_sub(age).unwrap_or(request.arrived);
-        if message.needs_id && request.id.is_none() {
+        if drive_fleet::mutant!("nameless-command-moves", message.needs_id, false) && request.id.is_none() {
             return Err(Refusal::IdNeeded);
         }
         Ok(request)
@@ -191,7 +193,7 @@ impl<A: Answers + Sync> Desk<A> {
 /// How old a message is that says when it was sent, within its lifetime.
 fn judge_time(sent: [Option<u64>; 2], arrived: Instant, lifetime: Duration) -> Result<Duration, Refusal> {
     let Some(sent) = sent.into_iter().flatten().min() else { return Ok(Duration::ZERO) };
-    let age = age(sent, arrived)?;
+    let age = drive_fleet::mutant!("old-command-moves", age(sent, arrived)?, Duration::ZERO);
     if age >= lifetime { Err(Refusal::Expired { age, lifetime }) } else { Ok(age) }
 }
 

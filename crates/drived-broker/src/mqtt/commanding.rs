@@ -107,8 +107,10 @@ impl Commanding {
         if arrived.topic == face.topics.echo() {
             return self.echoed(arrived);
         }
-        let late = self.is_late(arrived).then_some(Refusal::Late);
-        let doubt = if arrived.retain { Some(Refusal::Retained) } else { late };
+        let is_late = drive_fleet::mutant!("late-command-moves", self.is_late(arrived), false);
+        let late = is_late.then_some(Refusal::Late);
+        let is_kept = drive_fleet::mutant!("kept-command-moves", arrived.retain, false);
+        let doubt = if is_kept { Some(Refusal::Retained) } else { late };
         if let Some(commander) = face.topics.asked_of_alarms(&arrived.topic) {
             self.desk.take_alarms(desk::AlarmMessage {
                 said: AlarmsSaid::of(std::str::from_utf8(&arrived.payload).unwrap_or_default()),
@@ -165,7 +167,9 @@ impl Commanding {
     fn answers(&self, arrived: &Arrived, outcome: String, drive: Option<String>) -> To {
         let face = Arc::clone(&self.face);
         let response = arrived.properties.response_topic.clone();
-        let response = response.filter(|topic| face.topics.is_foreign(topic));
+        let is_foreign = |topic: &str| face.topics.is_foreign(topic);
+        let response =
+            response.filter(|topic| drive_fleet::mutant!("answer-is-a-command", is_foreign(topic), true));
         To { face, drive, outcome, response, correlation: arrived.properties.correlation.clone() }
     }
 }
@@ -215,8 +219,13 @@ fn caller(face: &Face, commander: Option<&str>) -> Caller {
     let name = commander.unwrap_or(NAMELESS).to_owned();
     let role = match face.config.commanders.is_empty() {
         true => commander.is_none().then_some(Role::Operate),
-        false => face.config.commanders.get(&name).copied(),
+        false => face.config.commanders.get(&name).copied().or(drive_fleet::mutant!(
+            "nobody-operates",
+            None,
+            commander.is_none().then_some(Role::Operate)
+        )),
     };
+    let role = drive_fleet::mutant!("whoever-has-a-name-operates", role, commander.map(|_| Role::Operate));
     Caller::new(name, "mqtt", role.map_or(Rights::NONE, Role::rights))
 }
 
@@ -260,11 +269,14 @@ impl Answers for To {
             }
         };
         let payload = bytes::Bytes::from(payload.to_string());
-        for topic in std::iter::once(&self.outcome).chain(&self.response) {
+        let asked_for = drive_fleet::mutant!("who-asks-is-not-answered", &self.response, &None);
+        for topic in std::iter::once(&self.outcome).chain(asked_for) {
             let mut message = Message::new(topic, payload.clone());
+            message.retain = drive_fleet::mutant!("outcome-is-kept", false, true);
             message.expires = Some(Instant::now() + SETTLES_FOR);
             message.properties.content_type = Some("application/json".to_owned());
-            message.properties.correlation = self.correlation.clone();
+            message.properties.correlation =
+                drive_fleet::mutant!("answer-without-its-number", self.correlation.clone(), None);
             self.face.broker.publish(message, Kept::InOrder);
         }
     }

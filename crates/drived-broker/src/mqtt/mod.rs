@@ -72,6 +72,7 @@ impl Face {
     /// Tells state, which the broker keeps until it has not been told again for three heartbeats.
     fn tell(&self, topic: String, payload: String) {
         let expires = Some(Instant::now() + self.config.heartbeat * 3);
+        let expires = drive_fleet::mutant!("state-for-ever", expires, None);
         let message = Message { qos: Qos::AtMostOnce, expires, ..Message::new(topic, payload).retained() };
         self.broker.publish(message, Kept::Latest);
     }
@@ -194,7 +195,8 @@ impl Prepared {
         let Self { config, options } = self;
         let topics = Topics::new(&config, names);
         let will = Will { message: Message::new(topics.status(), "offline").retained() };
-        let (broker, events) = Broker::start(options, move |_| Some(will.clone()));
+        let (broker, events) =
+            Broker::start(options, move |_| drive_fleet::mutant!("no-will", Some(will.clone()), None));
         let audited = audit.head();
         let (host, instance, anew) = (host_name(), instance(), watch::Sender::new(0));
         let face = Arc::new(Face { plant, config, topics, broker, host, instance, audited, anew });
@@ -238,7 +240,9 @@ async fn keep(
                 Some(Event::Connected(_)) => {
                     // Before it is told anew what is there.
                     gone.connected(&face);
-                    face.tell_for_good(face.topics.status(), "online");
+                    if drive_fleet::mutant!("back-and-silent", true, false) {
+                        face.tell_for_good(face.topics.status(), "online");
+                    }
                     face.anew.send_modify(|number| *number += 1);
                     daemon.tell(&face, true);
                     alarms.tell(&face, true);

@@ -26,7 +26,9 @@ pub(super) fn follow(mut runs: Records<RunRecord>, mut told: UnboundedReceiver<R
             }
             if changed {
                 let written = spawn_blocking(move || {
-                    runs.write();
+                    if drive_fleet::mutant!("run-unkept", true, false) {
+                        runs.write();
+                    }
                     runs
                 });
                 // The runtime ends.

@@ -314,7 +314,12 @@ fn write_all(mut file: File, records: &Receiver<Waiting>, shared: &Shared) {
 /// Writes what is missing, if anything is.
 fn close_gap(file: &mut File, shared: &Shared) -> std::io::Result<()> {
     let Some((record, many)) = shared.gap().record(unix_ms()) else { return Ok(()) };
-    file.append(&record)?;
+    if drive_fleet::mutant!("audit-is-never-written-again", false, true) {
+        return Err(std::io::ErrorKind::StorageFull.into());
+    }
+    if drive_fleet::mutant!("gap-untold", true, false) {
+        file.append(&record)?;
+    }
     // What was lost while this was written is the next gap.
     shared.gap().forget(many);
     if shared.gap().is_empty() && shared.failing.send_replace(false) {

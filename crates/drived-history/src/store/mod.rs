@@ -71,7 +71,9 @@ impl StoreError {
 }
 
 fn is_damage(error: &rusqlite::Error) -> bool {
-    matches!(error.sqlite_error_code(), Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase))
+    let code = error.sqlite_error_code();
+    matches!(code, Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase))
+        || drive_fleet::mutant!("full-disk-is-damage", false, code == Some(ErrorCode::DiskFull))
 }
 
 /// A file that was opened to be written.
@@ -88,6 +90,9 @@ pub struct Opened {
 /// [`StoreError`]: nothing was changed.
 pub fn open(path: &Path) -> Result<Opened, StoreError> {
     let lock = lock(path)?;
+    if drive_fleet::mutant!("past-begun-anew", false, path.exists()) {
+        put_aside(path)?;
+    }
     match open_locked(path) {
         Ok(connection) => Ok(Opened { store: Store { connection, _lock: lock }, aside: None }),
         Err(error) if error.is_damage() => {

@@ -196,7 +196,7 @@ impl<C: Fn() -> Moment> Work<C> {
             }
             Err(error) => {
                 self.tried = Some(Instant::now());
-                self.is_given_up = error.is_lasting();
+                self.is_given_up = drive_fleet::mutant!("full-disk-ends-the-past", error.is_lasting(), true);
                 // What is begun anew is tried at once.
                 if matches!(error, StoreError::Damaged(_)) {
                     self.tried = None;

@@ -89,6 +89,9 @@ async fn live(mut source: Source) -> Result<(), String> {
     locked(&truth).becomes_calm();
     sleep(LONGEST).await;
     locked(&truth).judge_the_end();
+    if drive.watch().has_changed().is_err() {
+        locked(&truth).object("whoever looks after it has ended before his fleet");
+    }
     // What runs by this side now is stopped by its end.
     drop(fleet.shutdown(Duration::from_secs(60)).await);
     sleep(LONGEST).await;

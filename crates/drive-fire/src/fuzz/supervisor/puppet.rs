@@ -53,7 +53,14 @@ impl Puppet {
         }
         match fate {
             Fate::Fails(error) => Err(error),
-            Fate::Unshown => Err(truth.not_confirmed(command)),
+            Fate::Unshown => {
+                // It was not carried out, or others took the drive as it was.
+                if truth.source.bool() {
+                    truth.taken = true;
+                    does(truth);
+                }
+                Err(truth.not_confirmed(command))
+            }
             Fate::LostAnswer => {
                 does(truth);
                 Err(port(PortError::OutcomeUnknown("no answer"), 6))
@@ -120,6 +127,7 @@ impl Drive for Puppet {
         let command = Command::Start(direction);
         let written = self.write(command, |truth| {
             truth.note("started");
+            truth.carried.push(Instant::now());
             truth.run = Some((direction, Instant::now())).filter(|_| !truth.tripped);
             truth.stopped_at = None;
         });

@@ -50,6 +50,10 @@ pub(super) struct Truth {
     pending: Vec<(Ordered, Instant)>,
     /// From when to when each start was on its way that was confirmed.
     confirmed: Vec<(Instant, Instant)>,
+    /// When each start was given, and told.
+    starts: Vec<(Instant, Option<Instant>)>,
+    /// When a run command was carried out.
+    pub(super) carried: Vec<Instant>,
     pub(super) resets_ordered: u32,
     pub(super) resets: u32,
     pub(super) against: Option<&'static str>,
@@ -98,6 +102,8 @@ impl Truth {
             given_setpoint: None,
             pending: Vec::new(),
             confirmed: Vec::new(),
+            starts: Vec::new(),
+            carried: Vec::new(),
             resets_ordered: 0,
             resets: 0,
             against: None,
@@ -235,7 +241,10 @@ impl Truth {
         self.note(format!("{ordered:?}"));
         self.pending.push((ordered, at));
         match ordered {
-            Ordered::Start(_) => self.given_start = Some(at),
+            Ordered::Start(_) => {
+                self.given_start = Some(at);
+                self.starts.push((at, None));
+            }
             Ordered::Stop => self.given_stop = Some(at),
             _ => {}
         }
@@ -274,6 +283,9 @@ impl Truth {
         if let Some(at) = self.pending.iter().position(|pending| *pending == (ordered, given)) {
             self.pending.remove(at);
         }
+        if let Ordered::Start(_) = ordered {
+            self.start_is_told(given, now, outcome);
+        }
         let is_confirmed = outcome.is_confirmed();
         if is_confirmed && !self.control {
             self.object("a command to what is only watched is confirmed");
@@ -310,6 +322,24 @@ impl Truth {
                 }
             }
             _ => {}
+        }
+    }
+
+    /// What is told of a start against what was done of it, where no other was on its way meanwhile.
+    fn start_is_told(&mut self, given: Instant, now: Instant, outcome: &Outcome) {
+        let is_it = |start: &&mut (Instant, Option<Instant>)| start.0 == given && start.1.is_none();
+        if let Some(start) = self.starts.iter_mut().find(is_it) {
+            start.1 = Some(now);
+        }
+        let meanwhile = |start: &&(Instant, Option<Instant>)| start.1.is_none_or(|told| told >= given);
+        let is_alone = self.starts.iter().filter(meanwhile).count() == 1;
+        let was_carried = self.carried.iter().any(|at| *at >= given);
+        if matches!(outcome, Outcome::Refused(_) | Outcome::Expired) && was_carried && is_alone {
+            self.object("a start that was carried out is told as not sent");
+        }
+        let was_seen = self.told_status.is_some_and(|(at, _)| at >= given);
+        if matches!(outcome, Outcome::NotConfirmed(_)) && !was_seen {
+            self.object("it is told that the drive shows otherwise, and nobody has looked at it");
         }
     }
 

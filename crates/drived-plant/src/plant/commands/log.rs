@@ -67,7 +67,8 @@ impl Log {
         let Request { id, target, action, lifetime, arrived } = request;
         let mut entries = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         entries.forget(arrived);
-        if let Some(id) = id.filter(|_| !matches!(action, Action::Stop(_)))
+        let is_once = !matches!(action, Action::Stop(_));
+        if let Some(id) = id.filter(|_| drive_fleet::mutant!("done-twice", is_once, false))
             && let Some(entry) = entries.by_id.get(&id)
         {
             let is_same = entry.caller == caller.name

@@ -1,6 +1,9 @@
 //! Days of a plant in virtual time: many lines full of drives of every family, a fault every few seconds, commands all the time. Whatever
 //! the fleet tells is held against the machines; each command ends, a stop within its time; what is only watched is never written, what
-//! its owner's limits forbid is never taken, and what runs when the fleet ends is stopped by it; memory does not grow with the days.
+//! its owner's limits forbid is never taken, and what runs when the fleet ends is stopped by it; memory, queues and ages do not grow with
+//! the days.
+
+mod days;
 
 use std::{
     collections::BTreeMap,
@@ -23,6 +26,7 @@ use crate::{
     matrix::{self, Planted, drive_of},
     report::{Find, Plant, Told},
 };
+use days::Days;
 
 /// Something is commanded, or happens, this often on each line.
 const EVERY: Duration = Duration::from_secs(3);
@@ -161,7 +165,8 @@ async fn live(
     let fleet = builder.start().expect("whatever the plan");
     *witnesses = Witnesses::of_fleet(&fleet, sites.iter().map(|(name, line)| (&**name, line)));
     let kept = Arc::new(Mutex::new(Kept::default()));
-    let (begun, mut early) = (Instant::now(), None);
+    let (begun, mut early, mut days) = (Instant::now(), None, Days::begin());
+    let config = LineConfig::stream(settings);
     while begun.elapsed() < size.time && go_on() {
         for (name, simulated) in &sites {
             let drives = fleet.drives_on(name);
@@ -172,11 +177,13 @@ async fn live(
             }
         }
         sleep(EVERY).await;
+        days.look(&fleet, &config, memory);
         if early.is_none() && begun.elapsed() * 10 > size.time {
             early = memory();
         }
     }
     let lived = begun.elapsed();
+    days.ends(&fleet, &config, memory());
     // All is well again, and everything stops.
     for (_, simulated) in &sites {
         simulated.set_faults(Faults::default());
@@ -204,10 +211,12 @@ async fn live(
     }
     told.details.push(format!("at the end each is stopped, and one of each line started: {ends:?}"));
     told.details.push(format!("longest stop until it was told: {:.1} s", kept.longest_stop.as_secs_f64()));
+    told.details.append(&mut days.lines);
     let mut find = |what: String| told.finds.push(Find { what, replay: size.replay(seed) });
     if kept.told != kept.given {
         find(format!("{} of {} commands were told", kept.told, kept.given));
     }
+    days.against.iter().for_each(|what| find(what.clone()));
     kept.late.iter().chain(&kept.passed).take(4).for_each(|what| find(what.clone()));
     for machine in machines.iter().filter(|machine| machine.observe().output_frequency != 0) {
         find(format!("{} runs behind the end of the fleet that has started it", machine.name()));
