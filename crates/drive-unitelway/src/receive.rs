@@ -16,6 +16,7 @@ use crate::{
 
 /// Why a reply that fits its request is not taken.
 const DOUBTED: &str = "the confirmation may belong to an earlier request";
+const ANOTHER_BEHIND_IT: &str = "behind the reply came another one to the same question";
 
 impl UniTelway {
     /// Takes what the receiver has made of the bytes.
@@ -105,7 +106,19 @@ impl UniTelway {
         };
         match (wanted, &mut current.mark) {
             (Wanted::Room, _) => self.leftover(now, stray, Then::Ask),
-            (Wanted::Nothing, _) => self.leftover(now, stray, Then::Poll(Wanted::Nothing)),
+            (Wanted::Nothing, _) => {
+                // One of the two was said to an earlier poll, and kept on the way: which one, nothing tells. The same once more is
+                // only a reply whose acknowledgement was lost.
+                let again = unite.and_then(|unite| match unite {
+                    Ok(unite) => current.request.check(&unite).ok(),
+                    Err(refusal) => Some(Err(refusal)),
+                });
+                let is_another = again.is_some_and(|again| current.result.as_ref() != Some(&Ok(again)));
+                if is_another {
+                    current.result = Some(Err(Failure::Doubted(ANOTHER_BEHIND_IT)));
+                }
+                self.leftover(now, stray, Then::Poll(Wanted::Nothing))
+            }
             (Wanted::Reply, Some(mark)) => match unite {
                 Some(Ok(unite)) if *unite == mark.reply => {
                     current.mark = None;

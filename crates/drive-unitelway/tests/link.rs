@@ -310,6 +310,28 @@ fn a_slave_is_known_to_hold_nothing_only_once_it_has_said_so_behind_its_last_rep
     assert_eq!(request, reply(&[0x14, 0x07, 0x90, 0x01, 0x06, 0x00]));
 }
 
+/// Found by `drive-fire worlds`: a status of half a second ago, which an adapter had kept, told a motor that came down as one at rest.
+#[test]
+fn a_reply_behind_which_the_slave_has_another_one_to_the_same_question_is_doubted() {
+    for (second, is_taken) in [(&[0x34, 1, 2][..], false), (&[0x34, 0, 0], true), (&[0xFE], true)] {
+        let mut script = settled();
+        script.ask(1, &read());
+        acknowledge(&mut script);
+        // It was said to an earlier poll; what it says to this one is still to come.
+        assert_eq!(script.hear(&reply(&[0x34, 0, 0])), Step::More);
+        assert_eq!(*send(&mut script), *ACK);
+        assert_eq!(script.wait(), Step::More);
+        assert_eq!(send(&mut script), poll(1));
+        assert_eq!(dropped(&mut script, &reply(second)), poll(1));
+        let answer = script.hear(EOT);
+        if is_taken {
+            assert_eq!(answer, Step::Done(Ok(Ok(Reply::Words(vec![0])))), "{second:02X?}");
+        } else {
+            assert!(matches!(answer, Step::Done(Err(Failure::Doubted(_)))), "{second:02X?}: {answer:?}");
+        }
+    }
+}
+
 #[test]
 fn two_marks_are_never_the_same() {
     let mut script = Script::new(UniTelwaySettings::default());
