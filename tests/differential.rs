@@ -4,7 +4,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use drive_core::Row;
-use drive_families::{Family, Options};
+use drive_families::{Family, Options, SetUp};
 use drive_profile::{Level, Profile, definition, read};
 use drive_sim::SimSlave;
 use drive_testing::{
@@ -113,6 +113,22 @@ async fn compare(family: Family, text: &str, options: &[(&str, &str)], watchdog:
         .partition(|said| watchdog.is_some_and(|trip| told_by_a_lost_twin(said, trip)));
     lost.iter().for_each(|said| println!("  set aside: {said}"));
     assert!(said.is_empty(), "by file:\n{}", said.into_iter().cloned().collect::<Vec<_>>().join("\n"));
+}
+
+/// Both files, each over the simulated drive that is made of the file itself, which is what `drived sim` and a trial on it show of it. The
+/// other tests here have the simulators of the drives that are written by hand.
+#[tokio::test(start_paused = true)]
+async fn a_file_drives_the_twin_that_is_made_of_it() {
+    for text in [ATV312, OMRON] {
+        let file = Family::new(definition(&Arc::new(profile(text))));
+        let said = file.simulated_options();
+        let own = Contract::new(
+            file.capabilities(),
+            move |port, slave| file.open_with(port, slave, &said),
+            move || file.machine(SetUp::ForTheBus).expect("it has a twin"),
+        );
+        own.lives_the_story().await;
+    }
 }
 
 #[tokio::test(start_paused = true)]

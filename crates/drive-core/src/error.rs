@@ -140,6 +140,13 @@ pub enum SetpointProblem {
         /// The highest that is allowed.
         high: Speed,
     },
+    /// The drive tells no limit, and its owner has said that it is this.
+    OutsideOwnersLimits {
+        /// The lowest that is allowed.
+        low: Frequency,
+        /// The highest that its owner allows.
+        high: Frequency,
+    },
     /// The register's resolution cannot hold it exactly.
     Resolution(&'static str),
     /// The register cannot hold a number this large.
@@ -151,6 +158,7 @@ impl fmt::Display for SetpointProblem {
         match self {
             Self::OutsideFrequencyLimits { low, high } => write!(f, "the drive allows {low} to {high}"),
             Self::OutsideSpeedLimits { low, high } => write!(f, "the drive allows {low} to {high}"),
+            Self::OutsideOwnersLimits { low, high } => write!(f, "its owner allows {low} to {high}"),
             Self::Resolution(step) => write!(f, "the drive takes steps of {step}"),
             Self::TooLarge => f.write_str("the register cannot hold it"),
         }

@@ -19,7 +19,8 @@ pub enum Motion {
     Braking,
     /// It stands, and the drive holds it there by direct current.
     Held,
-    /// The output was cut while it turned, or was not there when it was first looked at, and nothing tells when it has come to rest.
+    /// The output was cut while it turned, or was not there at the first look or the first one behind a lost line, and nothing tells
+    /// when it has come to rest.
     Coasting,
     /// The drive brought it down to no output, or watches the shaft itself and says that it stands, or its coast time is over. What it
     /// did between two looks nobody saw: a motor that was at rest, and that others have run and let coast meanwhile, is told to be at

@@ -108,6 +108,7 @@ impl<'a> Ladder<'a> {
         let link = file.link.get_ref();
         self.sound(Level::Stop, "the line and its functions", &link.source);
         self.numbering();
+        self.hex();
         let stops: Vec<_> = file.actions().filter(|(name, _)| name.starts_with("stop.")).collect();
         if stops.is_empty() {
             self.ask(
@@ -124,6 +125,7 @@ impl<'a> Ladder<'a> {
 
     fn motion(&mut self) {
         let file = self.file;
+        self.rungs();
         for (state, name) in [(StateName::Running, "that it runs"), (StateName::Fault, "that it has tripped")]
         {
             let mut shows = file.state.is.iter().filter(|is| is.get_ref().state == state).peekable();

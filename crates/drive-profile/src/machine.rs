@@ -356,6 +356,9 @@ impl Machine {
                 telling.push(bits.register.get_ref());
             }
         }
+        if !is_it(&best) {
+            best = self.told_by_no_other(&best, state).unwrap_or(best);
+        }
         let starts = [&file.start.forward, &file.start.reverse].into_iter().filter_map(|start| start.given());
         for awaited in
             starts.flat_map(|start| &start.get_ref().steps).filter_map(|step| step.get_ref().awaits.as_ref())
@@ -367,6 +370,28 @@ impl Machine {
             }
         }
         best
+    }
+
+    /// The same with the bits of a state whose row stands behind those of others that fit as well, as one does for which nothing is
+    /// set: one bit of theirs is changed. `None`: no one bit does it.
+    fn told_by_no_other(&self, words: &Cells, state: State) -> Option<Cells> {
+        let rows = || self.profile.file().state.is.iter().map(crate::format::Spanned::get_ref);
+        let (its, others): (Vec<_>, Vec<_>) = rows().partition(|row| row.state.state() == state);
+        its.into_iter().find_map(|row| {
+            let mut set = words.clone();
+            self.set(&mut set, row.bits.get_ref(), true);
+            others.iter().find_map(|other| {
+                let bits = other.bits.get_ref();
+                let register = bits.register.get_ref();
+                (0..u16::BITS).map(|at| bits.mask.get_ref() & 1 << at).filter(|bit| *bit != 0).find_map(
+                    |bit| {
+                        let mut tried = set.clone();
+                        self.put_word(&mut tried, register, bit, !bits.value & bit);
+                        (self.told(&tried) == state).then_some(tried)
+                    },
+                )
+            })
+        })
     }
 
     fn show_direction(&self, words: &mut Cells, output: i32) {

@@ -142,6 +142,55 @@ fn a_state_that_needs_its_ladder_and_no_ladder() {
     );
 }
 
+/// From 31h the word that has led there leads no further.
+#[test]
+fn two_rungs_that_write_the_same_word() {
+    let altivar = shipped("schneider/altivar");
+    let rung = "value = 0x0031, source = \"invlib\" }, do = \"write\", register = \"CMD\", word = 0x0007 }";
+    let again = rung.replace("0x0007", "0x0006");
+    held(&damaged(altivar, rung, &again), Level::Motion, &again, "two rungs of its ladder write 0006h");
+}
+
+/// A quick stop is another stop, and the output of a drive in one is not gone.
+#[test]
+fn a_quick_stop_shows_no_stop_along_the_ramp() {
+    let altivar = shipped("schneider/altivar");
+    let ramp = altivar.lines().find(|line| line.starts_with("ramp = {")).expect("it has one");
+    let (head, rest) = ramp.split_once("seen = [").expect("it is seen");
+    let (_, tail) = rest.split_once(']').expect("it ends");
+    let by = format!("{head}seen = [\"disabled\", \"ready\", \"quick_stop\"]{tail}");
+    refused(
+        &damaged(altivar, ramp, &by),
+        &by,
+        "stop.ramp is said to be done in a quick stop, which is another one and brakes on",
+        "stop.fast alone",
+    );
+    // Where it belongs, as at the Altivar 312.
+    read(include_str!("../../../tests/profiles/atv312.toml")).expect("its fast stop is a quick stop");
+}
+
+/// 2000h is where the manual has the command, beside 2001h (22C-UM001 p. E-2).
+#[test]
+fn an_address_in_hex_without_its_0x() {
+    let text = damaged(POWERFLEX, "address = 8192", "address = 2000");
+    held(&text, Level::Stop, "address = 2000", "2000h would stand beside them");
+}
+
+/// 0013h starts it with the bit of the stop (bit 0), where 0012h is meant (22C-UM001 p. E-2).
+#[test]
+fn a_start_that_holds_the_bit_of_the_stop() {
+    let forward = POWERFLEX.lines().find(|line| line.starts_with("forward = {")).expect("it has one");
+    let by = damaged(forward, "0x0012", "0x0013");
+    refused(
+        &damaged(POWERFLEX, forward, &by),
+        &by,
+        "start.forward writes 0013h, which holds the bit of stop.ramp (0001h)",
+        "without the bit of the stop",
+    );
+    // What a start holds because the run command does: 7 below Fh (BBV51701 p. 11), both ways.
+    read(include_str!("../../../tests/profiles/atv312.toml")).expect("its starts hold its stop");
+}
+
 #[test]
 fn a_highest_setpoint_in_seconds() {
     const LIMITS: &str = "limits = { low = 0, high = 10000 }";

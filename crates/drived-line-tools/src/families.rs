@@ -30,10 +30,39 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
 }
 
-/// What a family can do, for a program.
+/// What a file leaves open of the line of its drives. Something is taken for it, which any drive may have, and is no fact of this one.
+#[derive(Clone, Copy, Default)]
+struct Open {
+    addresses: bool,
+    speeds: bool,
+    formats: bool,
+    factory: bool,
+}
+
+impl Open {
+    fn of(family: Family) -> Self {
+        let profile = profiles::find(family.capabilities().key).map(|(profile, _)| profile);
+        let link = profile.as_ref().map(|profile| profile.file().link.get_ref());
+        link.map_or_else(Self::default, |link| Self {
+            addresses: link.highest_address.is_unknown(),
+            speeds: link.speeds.is_unknown(),
+            formats: link.formats.is_unknown(),
+            factory: link.factory.is_unknown(),
+        })
+    }
+}
+
+/// What a family can do, for a program. What is not known is null, and stands below `taken_for`.
 fn object(family: Family) -> Value {
     let capabilities = family.capabilities();
     let texts = |all: &[&str]| all.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let open = Open::of(family);
+    let known = |is_open: bool, value: Value| if is_open { Value::Null } else { value };
+    let taken_for = |is_open: bool, value: Value| if is_open { value } else { Value::Null };
+    let addresses = json!(capabilities.highest_address);
+    let speeds = json!(capabilities.speeds);
+    let formats = json!(capabilities.formats.iter().map(ToString::to_string).collect::<Vec<_>>());
+    let factory = json!(capabilities.factory.to_string());
     let options = family
         .options()
         .iter()
@@ -41,11 +70,17 @@ fn object(family: Family) -> Value {
     json!({
         "family": family.to_string(),
         "name": capabilities.name,
-        "highest_address": capabilities.highest_address,
-        "speeds": capabilities.speeds,
-        "formats": capabilities.formats.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "highest_address": known(open.addresses, addresses.clone()),
+        "speeds": known(open.speeds, speeds.clone()),
+        "formats": known(open.formats, formats.clone()),
         "protocols": texts(capabilities.protocols),
-        "factory": capabilities.factory.to_string(),
+        "factory": known(open.factory, factory.clone()),
+        "taken_for": {
+            "highest_address": taken_for(open.addresses, addresses),
+            "speeds": taken_for(open.speeds, speeds),
+            "formats": taken_for(open.formats, formats),
+            "factory": taken_for(open.factory, factory),
+        },
         "stop_modes": capabilities.stop_modes.iter().map(ToString::to_string).collect::<Vec<_>>(),
         "fault_reset": capabilities.fault_reset,
         "stations": capabilities.stations,
@@ -62,11 +97,13 @@ fn all() -> Result<(), Failure> {
     let mut table = Table::new(["family", "drive", "addresses", "speeds", "protocols"]);
     for family in Family::all() {
         let Capabilities { name, highest_address, speeds, .. } = family.capabilities();
+        let open = Open::of(family);
+        let known = |is_open: bool, value: String| if is_open { "not known".to_owned() } else { value };
         table.row([
             family.to_string(),
             (*name).to_owned(),
-            format!("1-{highest_address}"),
-            list(speeds),
+            known(open.addresses, format!("1-{highest_address}")),
+            known(open.speeds, list(speeds)),
             list(family.capabilities().protocols),
         ]);
     }
@@ -78,20 +115,18 @@ fn one(family: Family) -> Result<(), Failure> {
     output::say(format_args!("{family}: {}", capabilities.name))?;
     let mut facts = Table::texts();
     let mut fact = |label: &str, value: String| facts.row([format!("  {label}"), value]);
-    // What a file leaves open is what any drive may have, and no fact of this one.
-    let profile = profiles::find(capabilities.key).map(|(profile, _)| profile);
-    let link = profile.as_ref().map(|profile| profile.file().link.get_ref());
-    let or_not_known = |is_open: Option<bool>, value: String| match is_open {
-        Some(true) => format!("not known; taken for {value}"),
-        _ => value,
+    let open = Open::of(family);
+    let or_not_known = |is_open: bool, value: String| match is_open {
+        true => format!("not known; taken for {value}"),
+        false => value,
     };
     let addresses = format!("1 to {}", capabilities.highest_address);
-    fact("addresses", or_not_known(link.map(|link| link.highest_address.is_unknown()), addresses));
-    fact("speeds", or_not_known(link.map(|link| link.speeds.is_unknown()), list(capabilities.speeds)));
-    fact("formats", or_not_known(link.map(|link| link.formats.is_unknown()), list(capabilities.formats)));
+    fact("addresses", or_not_known(open.addresses, addresses));
+    fact("speeds", or_not_known(open.speeds, list(capabilities.speeds)));
+    fact("formats", or_not_known(open.formats, list(capabilities.formats)));
     fact("protocols", list(family.capabilities().protocols));
     let factory = capabilities.factory.to_string();
-    fact("factory setting", or_not_known(link.map(|link| link.factory.is_unknown()), factory));
+    fact("factory setting", or_not_known(open.factory, factory));
     fact("stop modes", list(capabilities.stop_modes));
     fact("fault reset", capabilities.fault_reset.to_owned());
     fact("stations on a segment", capabilities.stations.to_string());

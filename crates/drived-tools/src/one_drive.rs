@@ -1,5 +1,10 @@
 //! The one drive on which a subcommand acts.
 
+use std::{
+    collections::BTreeSet,
+    sync::{Mutex, PoisonError},
+};
+
 use drive_bus::{Endpoint, Line, LineConfig};
 use drive_core::{Drive, Error, Recognised, Row, Status, Written};
 use drive_families::Options;
@@ -19,6 +24,16 @@ use drived_words::{
     line_spec::{self, LineSpec},
     output, values,
 };
+
+/// What nobody can know of a drive that is commanded: in one line, and once in a process, so that the answer is not lost among it.
+fn say_not_known(drive: &str, not_known: &[impl AsRef<str>]) {
+    static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let mut told = TOLD.lock().unwrap_or_else(PoisonError::into_inner);
+    if !not_known.is_empty() && told.insert(drive.to_owned()) {
+        let all: Vec<&str> = not_known.iter().map(AsRef::as_ref).collect();
+        output::complain(format_args!("{drive}: {}", all.join("; ")));
+    }
+}
 
 /// Which drive a subcommand acts on: one on a line, by `--line` and `--drive`, or what the running daemon knows by name.
 #[derive(Debug, clap::Args)]
@@ -56,10 +71,7 @@ impl OneDriveArgs {
         let state = daemon.state().await?;
         let target = Target::find(&state, name)?;
         let commanded = state.drives.iter().filter(|drive| target.has(&state, drive.name()));
-        for (drive, said) in commanded.flat_map(|drive| drive.not_known.iter().map(move |said| (drive, said)))
-        {
-            output::complain(format_args!("{}: {said}", drive.name()));
-        }
+        commanded.for_each(|drive| say_not_known(drive.name(), &drive.not_known));
         client::order(&self.daemon, daemon, &target, told).await
     }
 
@@ -95,7 +107,7 @@ impl OneDriveArgs {
     pub async fn command(&self, accepted: Vec<String>) -> Result<Commanded, Failure> {
         let (name, options, config) = self.parts()?;
         let line = open_line_of(Some(name), config.clone()).await?;
-        name.family.not_known().iter().for_each(|said| output::complain(format_args!("{name}: {said}")));
+        say_not_known(&name.to_string(), name.family.not_known());
         Ok(self.telling(Commanded::over(name, line, config, &options, accepted)?))
     }
 

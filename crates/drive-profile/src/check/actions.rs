@@ -256,6 +256,8 @@ impl Check<'_> {
         }
         self.runs_nothing(name, action);
         self.leaves_nothing_running(name, action);
+        self.stands_in_no_start(name, action);
+        self.is_no_quick_stop(name, action.get_ref());
         if action.get_ref().seen.as_ref().is_none_or(|seen| seen.get_ref().is_empty()) {
             self.refuse(
                 &action.span(),

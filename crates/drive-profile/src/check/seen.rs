@@ -1,9 +1,21 @@
-//! What is measured: by another register than the one that is written.
+//! What is seen: measured by another register than the one that is written, and a stop by states that are its own.
 
 use super::Check;
-use crate::format::{Answer, Spanned};
+use crate::format::{Action, Answer, Spanned, StateName};
 
 impl Check<'_> {
+    /// A drive in a quick stop is braked on, by another stop than the one that would be told.
+    pub(super) fn is_no_quick_stop(&mut self, name: &str, stop: &Action) {
+        let Some(seen) = stop.seen.as_ref().filter(|_| name != "stop.fast") else { return };
+        if seen.get_ref().contains(&StateName::QuickStop) {
+            self.refuse(
+                &seen.span(),
+                format!("{name} is said to be done in a quick stop, which is another one and brakes on"),
+                "quick_stop in the `seen` of stop.fast alone; here the states in which no run command acts, a trip among them",
+            );
+        }
+    }
+
     /// An output that reads what was written bears out every start by its own echo.
     pub(super) fn is_no_echo(&mut self, seen: &Answer<Spanned<String>>) {
         let file = self.file;

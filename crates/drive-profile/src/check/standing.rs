@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Check;
 use crate::{
-    format::{Action, Acts, Space, Spanned},
+    format::{Action, Acts, Bits, Space, Spanned},
     profile::Written,
 };
 
@@ -41,6 +41,39 @@ impl Check<'_> {
             format!("{name} leaves {left} standing: the next setpoint, or the end of what stops it, runs the motor"),
             "the one write that takes the run bit away; \"unknown\" where the drive has none",
         );
+    }
+
+    /// The one bit of a stop stands in the word of one start and not in that of the other: a bit too many. Where the run command itself
+    /// has it, as below operation enabled, or both starts do, it belongs there; so do the bits of a stop that takes one away.
+    pub(super) fn stands_in_no_start(&mut self, name: &str, stop: &Spanned<Action>) {
+        let file = self.file;
+        let (Some(forward), Some(reverse)) = (file.start.forward.given(), file.start.reverse.given()) else {
+            return;
+        };
+        let Some(&word) = file.writes(stop.get_ref()).first() else { return };
+        let holds = |start: &Spanned<Action>| {
+            let left = standing(&file.writes(start.get_ref())).get(&(word.space, word.address)).copied();
+            left.map(|left| (left, word.value.is_power_of_two() && left & word.value == word.value))
+        };
+        let (start, spanned, (left, _)) = match (holds(forward), holds(reverse)) {
+            (Some(it @ (_, true)), Some((_, false))) => ("start.forward", forward, it),
+            (Some((_, false)), Some(it @ (_, true))) => ("start.reverse", reverse, it),
+            _ => return,
+        };
+        let runs = file.command.given().into_iter().flat_map(|command| &command.get_ref().runs);
+        let its = |bits: &&Spanned<Bits>| {
+            let place = file.named(bits.get_ref().register.get_ref()).and_then(|of| file.place(of));
+            place == Some((word.space, word.address)) && !bits.get_ref().differs && bits.get_ref().fit(left)
+        };
+        let needed =
+            runs.filter(its).fold(0, |all, bits| all | bits.get_ref().mask.get_ref() & bits.get_ref().value);
+        if word.value & !needed != 0 {
+            self.refuse(
+                &spanned.span(),
+                format!("{start} writes {left:04X}h, which holds the bit of {name} ({:04X}h), as the other start does not", word.value),
+                "the word of the start without the bit of the stop",
+            );
+        }
     }
 }
 

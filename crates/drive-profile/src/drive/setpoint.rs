@@ -194,6 +194,8 @@ impl<P: Port> ProfileDrive<P> {
             counts(value, scale[0], scale[1]).ok_or_else(|| problem(SetpointProblem::Resolution(step)))?;
         let limits = fact.limits.get_ref();
         let mut high = i64::from(limits.high);
+        // Also what 100 % is.
+        let mut owners = fact.full_scale.as_ref().is_some_and(|name| name.get_ref() == "owner");
         if let Some(name) = &limits.high_in {
             let allowed = if name.get_ref() == "owner" {
                 let highest = self.owner.highest.ok_or_else(|| refused(NO_HIGHEST))?;
@@ -204,10 +206,19 @@ impl<P: Port> ProfileDrive<P> {
             } else {
                 self.allowed(register, name.get_ref(), held)
             };
-            high = high.min(allowed.ok_or_else(|| refused(NO_HIGHEST))?);
+            let allowed = allowed.ok_or_else(|| refused(NO_HIGHEST))?;
+            owners |= name.get_ref() == "owner" && allowed < high;
+            high = high.min(allowed);
         }
         if !(i64::from(limits.low)..=high).contains(&count) {
-            return Err(problem(self.outside(limits.low.into(), high, scale, setpoint)));
+            let (outside, is_above) = (self.outside(limits.low.into(), high, scale, setpoint), count > high);
+            return Err(problem(match outside {
+                // What somebody has said of a drive is no word of the drive's.
+                SetpointProblem::OutsideFrequencyLimits { low, high } if owners && is_above => {
+                    SetpointProblem::OutsideOwnersLimits { low, high }
+                }
+                outside => outside,
+            }));
         }
         let highest = if register.signed { i16::MAX.cast_unsigned() } else { u16::MAX };
         let fits = u16::try_from(count).ok().filter(|count| *count <= highest);

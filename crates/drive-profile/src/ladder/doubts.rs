@@ -2,7 +2,7 @@
 
 use super::{Ladder, Level};
 use crate::{
-    format::{Numbering, Register, Setpoint, Space, Spanned, UnitName},
+    format::{Numbering, Register, Rung, Setpoint, Space, Spanned, UnitName},
     scale::hundredths,
 };
 
@@ -15,6 +15,9 @@ const LEAST_HIGHEST: i64 = 100;
 
 /// How manuals print holding registers that they count from 40001.
 const PRINTED: std::ops::RangeInclusive<u32> = 40_001..=49_999;
+
+/// How far apart addresses are at the most that stand beside each other.
+const NEAR: u32 = 0x100;
 
 impl Ladder<'_> {
     /// How fast it would turn at the highest that its setpoint may be.
@@ -62,6 +65,57 @@ impl Ladder<'_> {
                 &format!("one count of {name} would be {}.{:02} Hz", one / 100, one % 100),
                 "is its scale upside down? [1, 100] is 0.01 Hz for one count",
             );
+        }
+    }
+
+    /// A word that two rungs write from different states: a drive that has come from the one to the other by it holds it already.
+    pub(super) fn rungs(&mut self) {
+        let file = self.file;
+        let Some(rungs) = file.start.ladder.given().filter(|_| !self.is_tried(Level::Motion)) else { return };
+        let writes = |rung: &Spanned<Rung>| {
+            let rung = rung.get_ref();
+            rung.word.zip(rung.register.as_ref().map(|name| name.get_ref().clone()))
+        };
+        for (at, rung) in rungs.iter().enumerate() {
+            let Some(written) = writes(rung) else { continue };
+            if rungs.iter().take(at).any(|before| writes(before).as_ref() == Some(&written)) {
+                self.keep(
+                    Level::Motion,
+                    rung.span().start,
+                    &format!(
+                        "two rungs of its ladder write {:04X}h, and the second may lead nowhere",
+                        written.0
+                    ),
+                    "which word leads out of each of the two states?",
+                );
+            }
+        }
+    }
+
+    /// A number in hex without its 0x: far from all others, and beside them as one in hex.
+    pub(super) fn hex(&mut self) {
+        if self.is_tried(Level::Stop) {
+            return;
+        }
+        let file = self.file;
+        let space = |register: &Register| register.space.unwrap_or(file.link.get_ref().space);
+        let number = |register: &Register| *register.address.get_ref();
+        let all: Vec<_> = file.register.iter().map(|(name, of)| (name, of.get_ref())).collect();
+        for &(name, register) in &all {
+            let address = number(register);
+            let Ok(in_hex) = u32::from_str_radix(&address.to_string(), 16) else { continue };
+            let is_near = |to: u32| {
+                let others = all.iter().filter(|(other, of)| *other != name && space(of) == space(register));
+                others.into_iter().any(|(_, of)| number(of).abs_diff(to) <= NEAR)
+            };
+            if !is_near(address) && is_near(in_hex) {
+                self.keep(
+                    Level::Stop,
+                    register.address.span().start,
+                    &format!("{name} has the address {address}, far from all others, and {address}h would stand beside them"),
+                    &format!("is it a number in hex? 0x{address} then"),
+                );
+            }
         }
     }
 

@@ -331,6 +331,7 @@ const PATTERNS = [
   [/^the outcome of the write is unknown \((.+)\)$/, why => `l’issue de l’écriture est inconnue (${french(why)})`],
   [/^the slave is off-line, (.+)$/, when => `l’esclave est hors ligne, ${french(when)}`],
   [/^the line is down \((.+)\)$/, why => `la ligne est coupée (${why})`],
+  [/^its owner allows (.+) to (.+)$/, (low, high) => `son propriétaire admet ${number(low)} à ${number(high)}`],
   [/^the drive allows (.+) to (.+)$/, (low, high) => `le variateur admet ${number(low)} à ${number(high)}`],
   [/^the drive takes steps of (.+)$/, step => `le variateur procède par pas de ${number(step)}`],
   [/^the watchdog is (.+); the contract says (.+)$/, (is, contract) => `surveillance : ${reaction(is)} ; contrat : ${reaction(contract)}`],
