@@ -257,6 +257,8 @@ impl Answers for To {
             Answer::Refused(refused) => {
                 if let Some(drive) = &self.drive {
                     self.face.plant.note_refused_command(drive, refused.as_last());
+                    let told = self.face.refusals.of(drive, refused, Instant::now());
+                    told.into_iter().for_each(|told| self.face.plant.tell_notice(told));
                 }
                 json!(refused)
             }

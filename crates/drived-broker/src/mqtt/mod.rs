@@ -9,6 +9,7 @@ mod discovery;
 mod gone;
 mod last;
 mod parts;
+mod refused;
 mod telling;
 #[cfg(test)]
 mod tests;
@@ -25,7 +26,7 @@ use tokio::{
 
 use self::{
     alarms::Alarms, commanding::Commanding, discovery::Discovered, gone::Gone, last::LastCommands,
-    telling::Teller, topics::Topics,
+    refused::Refusals, telling::Teller, topics::Topics,
 };
 use crate::broker::{
     Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Wanted, Will,
@@ -66,6 +67,7 @@ struct Face {
     audited: watch::Receiver<Option<String>>,
     /// Rises when everything is to be told again.
     anew: watch::Sender<u64>,
+    refusals: Refusals,
 }
 
 impl Face {
@@ -199,7 +201,17 @@ impl Prepared {
             Broker::start(options, move |_| drive_fleet::mutant!("no-will", Some(will.clone()), None));
         let audited = audit.head();
         let (host, instance, anew) = (host_name(), instance(), watch::Sender::new(0));
-        let face = Arc::new(Face { plant, config, topics, broker, host, instance, audited, anew });
+        let face = Arc::new(Face {
+            plant,
+            config,
+            topics,
+            broker,
+            host,
+            instance,
+            audited,
+            anew,
+            refusals: Refusals::default(),
+        });
         let (closing, closes) = watch::channel(false);
         let commanding = Commanding::new(Arc::clone(&face), audit, closes);
         let closed = Arc::new(Notify::new());

@@ -489,6 +489,19 @@ async fn who_may_what_stands_in_the_configuration_and_a_stop_is_a_right_of_its_o
         sleep(Duration::from_secs(3)).await;
         assert_eq!(last(number)["reason"], reason, "{topic}: {}", last(number));
     }
+    // Who asks afterwards finds what the plant never heard of, and each attempt once.
+    bench.ask("drive/pump_1/command/panel", &start("x9").to_string());
+    sleep(Duration::from_secs(3)).await;
+    let told: Vec<String> = bench
+        .plant
+        .plant
+        .recent()
+        .into_iter()
+        .filter_map(|recent| recent.what.event())
+        .map(|told| told.text)
+        .collect();
+    let by_panel = told.iter().filter(|text| text.starts_with("pump 1: start by panel from mqtt: refused: "));
+    assert_eq!(by_panel.count(), 1, "{told:?}");
     bench.ask("drive/pump_1/command/hmi", &start("y").to_string());
     a_while().await;
     assert_eq!((bench.runs(0), last(1)["caller"].clone()), (true, "hmi".into()));

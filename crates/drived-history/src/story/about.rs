@@ -25,7 +25,7 @@ const ALSO: usize = 8;
 /// What is told of one reading is recorded within this time.
 const ONE_READING_MS: i64 = 150;
 /// What a story is about, the weightiest first. `run`: a motor began or ceased to run.
-const WEIGHT: [&str; 27] = [
+const WEIGHT: [&str; 28] = [
     "tripped",
     "stop_unconfirmed",
     "other_family",
@@ -49,6 +49,7 @@ const WEIGHT: [&str; 27] = [
     "setpoint",
     "parameter_written",
     "write_refused",
+    "command_refused",
     "maintenance_due",
     "state_changed",
     "warning",
@@ -104,8 +105,9 @@ fn weight(facts: &Facts, found: &RecordView) -> Option<usize> {
 
 /// What there is of the drive that a story can be about, with its weight and its beginning.
 fn told_of(facts: &Facts) -> impl Iterator<Item = (usize, i64, &RecordView)> {
-    let is_one =
-        |found: &&RecordView| matches!(&*found.kind, "event" | "command") && facts.is_of_drive(found);
+    let is_one = |found: &&RecordView| {
+        matches!(&*found.kind, "event" | "command") && facts.is_of_drive(found) || facts.is_refused(found)
+    };
     facts
         .records
         .iter()

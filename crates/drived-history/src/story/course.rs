@@ -34,7 +34,7 @@ pub(super) fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
                     && found.drive.is_none()
                     && matches!(&*found.what, "unacknowledged" | "returned" | "over")
             }
-            _ => true,
+            _ => found.what != "command_refused" || facts.is_refused(found),
         };
         is_near && is_meant
     };

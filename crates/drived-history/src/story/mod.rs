@@ -12,7 +12,7 @@ mod facts;
 mod tests;
 mod values;
 
-use drived_plant::plant::past::{Certainty, RecordView, SentenceView as Sentence, StoryView as Story};
+use drived_plant::plant::past::{RecordView, StoryView as Story};
 use rusqlite::Connection;
 
 pub use self::facts::AFTER_MS as LOOKED_AFTER_MS;

@@ -19,6 +19,8 @@
 //! | what spoils answers on the line | likely | it was lost by answers that were damaged |
 //! | another drive in its place | said | it names another one when it is heard again |
 //! | that it was not cut off | said | it was lost, and had answered by an exception |
+//! | that control fell back | said | who commands it now had commanded it before who had it last |
+//! | that its output had been falling | seen | its values, before its run command was seen to have gone |
 //! | its STOP key | said | its status has a bit for it, and that was set with the stop |
 //! | that this program did not ask | seen | it stood still for most of the silence |
 //! | what a line's drives share | likely | they fell silent together, and nobody of them answered meanwhile |

@@ -10,7 +10,15 @@ use super::{
 impl Facts {
     /// Whether a record is of this drive: what happened to it, or a command that was for it too.
     pub(in crate::story) fn is_of_drive(&self, found: &RecordView) -> bool {
-        found.drive.as_deref() == Some(&*self.drive) || self.of_several(found).is_some()
+        found.drive.as_deref() == Some(&*self.drive)
+            || self.of_several(found).is_some()
+            || self.is_refused(found)
+    }
+
+    /// Whether a record is of a command for this drive that a broker's face refused: that names its drive in its text.
+    pub(in crate::story) fn is_refused(&self, found: &RecordView) -> bool {
+        let rest = || found.text.strip_prefix(&*self.drive);
+        found.what == "command_refused" && rest().is_some_and(|rest| rest.starts_with(": "))
     }
 
     /// What became of a command for several at this drive.

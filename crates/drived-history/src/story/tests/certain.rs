@@ -299,3 +299,18 @@ fn a_stop_of_all_that_came_before_it_leaves_no_four_others_open() {
     assert!(story.why(Certainty::Seen).contains("what followed was done for bert"), "{story:?}");
     assert!(!story.why(Certainty::NotKnown).contains("which of them it was is not known"), "{story:?}");
 }
+
+/// `panel`, who may only stop, asked over MQTT for a start.
+#[test]
+fn a_start_that_the_broker_s_face_refused_is_told_to_who_asks_for_its_drive_and_no_other() {
+    for (drive, is_told) in [("pump 1", true), ("pump 11", false)] {
+        let mut night = Written::begin(&format!("certain-refused-{is_told}"));
+        night.heard_for(900);
+        let text = format!("{drive}: start by panel from mqtt: refused: panel has no right to operate");
+        night.kept(Kind::Notice, None, 300_205, "command_refused", &text, None);
+        let story = night.told(300_000);
+        let about = story.about.as_ref().map(|about| &*about.text);
+        assert_eq!(about, is_told.then_some(&*text), "{story:?}");
+        assert_eq!(story.course().contains("by panel from mqtt"), is_told, "{story:?}");
+    }
+}

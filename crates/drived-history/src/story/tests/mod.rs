@@ -19,6 +19,7 @@ use drived_config::{
 };
 use drived_plant::plant::{
     commands::{Action, Request, Target},
+    past::Certainty,
     testing::TestPlant,
 };
 use tokio::{
@@ -26,7 +27,7 @@ use tokio::{
     time::{Instant, sleep},
 };
 
-use super::{Certainty, Story, tell};
+use super::{Story, tell};
 use crate::{
     listen::{Clocks, Listening},
     quantity::{Quantity, Set},
