@@ -237,8 +237,8 @@ fn find_plants_of(
                 held
             };
             let Err(why) = held else { continue };
-            // What is open breaks such an invariant without a plant, too: it is found by an order that is sound without it.
-            if why.starts_with("open: ") && target.execute(number).is_err() {
+            // What is open is broken without a plant, too: one is found by an order that is sound without it.
+            if target.execute(number).is_err() {
                 continue;
             }
             let why: String = why.chars().take(200).collect();
