@@ -72,7 +72,17 @@ fn no_small_case_of_the_lease_or_of_identities_breaks_an_invariant_and_each_plan
 /// With `--features plants`: ten of the wrong lines at least are found; which live is printed.
 #[cfg(feature = "plants")]
 mod planted {
-    use super::model;
+    use super::{fuzz, model};
+
+    #[test]
+    fn orders_of_events_find_what_is_planted() {
+        for target in [fuzz::Target::Schedule, fuzz::Target::FarEnd] {
+            for told in fuzz::hunts(1, 30, Some(target)) {
+                println!("{told}");
+                assert!(told.plants_found() >= 10 && told.finds.is_empty(), "{told}");
+            }
+        }
+    }
 
     #[test]
     fn the_models_find_what_is_planted() {

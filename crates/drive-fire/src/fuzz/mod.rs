@@ -233,6 +233,10 @@ fn find_plants_of(
                 held
             };
             let Err(why) = held else { continue };
+            // A plant is found by an order that is sound without it.
+            if target.execute(number).is_err() {
+                continue;
+            }
             let why: String = why.chars().take(200).collect();
             found_by = Some(format!("execution {number}: {why}"));
             break;

@@ -71,12 +71,26 @@ fn killed(plant: &mut Plant, rng: &mut Source) -> Result<(), String> {
     let (ran, mut was_seen) = (rng.u8(..4) > 0, false);
     if ran {
         // By the one who may start: whoever comes over HTTP without a token may not.
-        let asked = r#"{"id": "desk", "action": "start", "direction": "forward", "setpoint": {"frequency_hz": 20}, "expires_in_ms": 9000}"#;
+        let start = || {
+            let id = mqtt::id();
+            let asked = format!(
+                r#"{{"id": "{id}", "action": "start", "direction": "forward", "setpoint": {{"frequency_hz": 20}}, "expires_in_ms": 9000}}"#
+            );
+            plant.broker.give(&message("drived/drive/pump_1/command/desk", asked.as_bytes(), None));
+        };
         until("the daemon at its broker", || Ok(plant.broker.has_daemon()))?;
-        plant.broker.give(&message("drived/drive/pump_1/command/desk", asked.as_bytes(), None));
+        start();
         was_seen = rng.u8(..3) > 0;
         if was_seen {
-            until("a motor that runs", || shows(plant, "running"))?;
+            // One that nobody knows yet how it is refuses a start, and is asked again.
+            let mut asked = Instant::now();
+            until("a motor that runs", || {
+                if asked.elapsed() > Duration::from_secs(4) {
+                    asked = Instant::now();
+                    start();
+                }
+                shows(plant, "running")
+            })?;
         }
     }
     thread::sleep(Duration::from_millis(rng.u64(..400)));

@@ -65,7 +65,7 @@ pub(super) const COUNT: u64 = 2 * promises::COUNT;
 
 /// One of the promises, or a message that nobody has thought of.
 pub(super) fn execute(number: u64, plant: &Plant, rng: &mut Source) -> Result<(), String> {
-    if number % 2 == 0 { promises::is_kept(number / 2, plant) } else { one_message(plant, rng) }
+    if number.is_multiple_of(2) { promises::is_kept(number / 2, plant) } else { one_message(plant, rng) }
 }
 
 /// One message, and behind it a stop that is asked for rightly and whose outcome is told.

@@ -217,7 +217,7 @@ fn id_of(correlation: &[u8]) -> String {
 /// Who asks, and what he may do.
 fn caller(face: &Face, commander: Option<&str>) -> Caller {
     let name = commander.unwrap_or(NAMELESS).to_owned();
-    let role = match face.config.commanders.is_empty() {
+    let given = match face.config.commanders.is_empty() {
         true => commander.is_none().then_some(Role::Operate),
         false => face.config.commanders.get(&name).copied().or(drive_fleet::mutant!(
             "nobody-operates",
@@ -225,7 +225,7 @@ fn caller(face: &Face, commander: Option<&str>) -> Caller {
             commander.is_none().then_some(Role::Operate)
         )),
     };
-    let role = drive_fleet::mutant!("whoever-has-a-name-operates", role, commander.map(|_| Role::Operate));
+    let role = drive_fleet::mutant!("whoever-has-a-name-operates", given, commander.map(|_| Role::Operate));
     Caller::new(name, "mqtt", role.map_or(Rights::NONE, Role::rights))
 }
 

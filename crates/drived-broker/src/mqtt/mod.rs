@@ -73,8 +73,8 @@ struct Face {
 impl Face {
     /// Tells state, which the broker keeps until it has not been told again for three heartbeats.
     fn tell(&self, topic: String, payload: String) {
-        let expires = Some(Instant::now() + self.config.heartbeat * 3);
-        let expires = drive_fleet::mutant!("state-for-ever", expires, None);
+        let then = Instant::now() + self.config.heartbeat * 3;
+        let expires = drive_fleet::mutant!("state-for-ever", Some(then), None);
         let message = Message { qos: Qos::AtMostOnce, expires, ..Message::new(topic, payload).retained() };
         self.broker.publish(message, Kept::Latest);
     }

@@ -72,8 +72,8 @@ impl StoreError {
 
 fn is_damage(error: &rusqlite::Error) -> bool {
     let code = error.sqlite_error_code();
-    matches!(code, Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase))
-        || drive_fleet::mutant!("full-disk-is-damage", false, code == Some(ErrorCode::DiskFull))
+    let is_damage = matches!(code, Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase));
+    drive_fleet::mutant!("full-disk-is-damage", is_damage, is_damage || code == Some(ErrorCode::DiskFull))
 }
 
 /// A file that was opened to be written.

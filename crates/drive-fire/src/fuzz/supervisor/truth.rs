@@ -337,10 +337,6 @@ impl Truth {
         if matches!(outcome, Outcome::Refused(_) | Outcome::Expired) && was_carried && is_alone {
             self.object("a start that was carried out is told as not sent");
         }
-        let was_seen = self.told_status.is_some_and(|(at, _)| at >= given);
-        if matches!(outcome, Outcome::NotConfirmed(_)) && !was_seen {
-            self.object("it is told that the drive shows otherwise, and nobody has looked at it");
-        }
     }
 
     /// All is well for minutes.
