@@ -146,11 +146,10 @@ impl<T> Schedule<T> {
         self.queued.iter().any(which)
     }
 
-    /// Since when a Stop that `which` names waits, if one does.
+    /// Since when a Stop waits, if one does for which `since` tells it.
     #[must_use]
-    pub fn first_stop(&self, which: impl Fn(&Entry<T>) -> bool) -> Option<Instant> {
-        let stops = self.queued.iter().filter(|entry| entry.terms.class == Class::Stop && which(entry));
-        stops.map(|entry| entry.arrived).min()
+    pub fn first_stop(&self, since: impl Fn(&Entry<T>) -> Option<Instant>) -> Option<Instant> {
+        self.queued.iter().filter(|entry| entry.terms.class == Class::Stop).filter_map(since).min()
     }
 
     /// What has waited longest of what `which` names.

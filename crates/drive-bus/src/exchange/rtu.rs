@@ -93,6 +93,14 @@ impl Rtu {
         }
     }
 
+    /// Nothing is awaited: what ends in a whole frame is judged at once.
+    fn judge_strays(&mut self) {
+        let is_whole = |offset: usize| self.received.get(offset..).is_some_and(is_frame);
+        if self.received.len() > MAX_FRAME || (0..self.received.len()).any(is_whole) {
+            self.judge(self.received.len());
+        }
+    }
+
     /// The time for the answer is over.
     fn fail(&mut self) -> Step {
         let Some(current) = self.current.take() else { return Step::More };
@@ -154,10 +162,7 @@ impl Machine for Rtu {
                 step
             }
             None => {
-                let is_whole = |offset: usize| self.received.get(offset..).is_some_and(is_frame);
-                if self.received.len() > MAX_FRAME || (0..self.received.len()).any(is_whole) {
-                    self.judge(self.received.len());
-                }
+                self.judge_strays();
                 Step::More
             }
         }
@@ -188,6 +193,8 @@ impl Machine for Rtu {
 
     fn abandon(&mut self) {
         self.current = None;
+        // A late answer of another slave may have come meanwhile, which needs its pause from then on.
+        self.judge_strays();
     }
 
     fn reset(&mut self) {

@@ -48,6 +48,9 @@ pub(super) struct FarEnd {
     /// How often in a row nothing has proved that it was done.
     unproven: u32,
     in_vain: u32,
+    /// Until when it may be at what a lost connection has asked, where nobody knows whether it goes on with that: what is asked
+    /// meanwhile shows nothing of its own time.
+    left_until: Option<Instant>,
 }
 
 /// A question in vain.
@@ -58,8 +61,25 @@ struct Owed {
     shape: Shape,
     asked: Instant,
     until: Instant,
+    /// `None`: nobody knows what stands before it.
+    turn: Option<Turn>,
     /// It was asked over a connection that is gone, and so may be the question.
     over_a_lost_port: bool,
+}
+
+impl Owed {
+    /// Its slave, which has not answered; of what a lost connection has asked nobody knows.
+    fn given_up(&self) -> Option<u8> {
+        (!self.over_a_lost_port).then_some(self.slave)
+    }
+}
+
+/// Where a question stands behind others, in a far end that does one thing at a time: it is over so many waits behind the moment at which
+/// the far end was free. What stood before it and could no longer come counts as well: it was waited for all the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Turn {
+    free_from: Instant,
+    place: u32,
 }
 
 /// A question that was given up, or is under way.
@@ -69,6 +89,15 @@ pub(super) struct Asked {
     pub(super) number: Option<u16>,
     pub(super) shape: Shape,
     pub(super) at: Instant,
+    pub(super) place: Place,
+}
+
+/// Behind what a question was sent. What stood before it may be over, as far as is known, when it is given up itself.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    turn: Option<Turn>,
+    /// When what stood before it could no longer come.
+    begins: Option<Instant>,
 }
 
 impl FarEnd {
@@ -83,6 +112,7 @@ impl FarEnd {
             free_from: None,
             unproven: 0,
             in_vain: 0,
+            left_until: None,
         }
     }
 
@@ -139,19 +169,42 @@ impl FarEnd {
         if crate::mutant!("far-end-owes-nothing", self.gateway.is_none(), true) || asked.slave == 0 {
             return;
         }
-        let in_turn = crate::mutant!("far-end-serves-side-by-side", self.serves < 2, false);
-        let begins = self.owed.iter().map(|owed| owed.until).max().filter(|_| in_turn);
+        // What it was done with since then is not before it any more.
+        let was_done = self.free_from.is_some_and(|free| free > asked.at);
+        let Place { turn, begins } = if was_done { self.place(asked.at) } else { asked.place };
+        let in_turn = self.serves_in_turn();
+        let before = self.owed.iter().map(|owed| owed.until).max().filter(|_| in_turn);
         let wait = crate::mutant!("far-end-gives-up-early", self.wait() * 5 / 4, self.wait() / 4);
         let limit = wait * (1 << self.unproven.min(DOUBLINGS));
         // It came to it when it was done with what it was at, which may be later than it was asked.
-        let begins = begins.or(self.free_from.filter(|_| in_turn));
+        let begins = before.max(begins).or(self.free_from.filter(|_| in_turn));
         let until = begins.unwrap_or(asked.at).max(asked.at) + limit;
-        let Asked { slave, number, shape, at } = asked;
+        let Asked { slave, number, shape, at, place: _ } = asked;
         if self.owed.len() >= MOST {
             self.owed.remove(0);
         }
-        self.owed.push(Owed { slave, number, shape, asked: at, until, over_a_lost_port: false });
+        self.owed.push(Owed { slave, number, shape, asked: at, until, turn, over_a_lost_port: false });
         self.in_vain = self.in_vain.saturating_add(1);
+    }
+
+    /// Whether one question waits behind the other, as far as is known.
+    fn serves_in_turn(&self) -> bool {
+        crate::mutant!("far-end-serves-side-by-side", self.serves < 2, false)
+    }
+
+    /// Behind what that stands which is asked at `at`.
+    pub(super) fn place(&self, at: Instant) -> Place {
+        let in_turn = self.serves_in_turn();
+        let turn = match self.owed.last().filter(|_| in_turn) {
+            Some(before) => before.turn.map(|turn| Turn { place: turn.place.saturating_add(1), ..turn }),
+            None if self.left_until.is_some_and(|until| at < until) => None,
+            None => {
+                let free = self.free_from.filter(|_| in_turn).map_or(at, |free| free.max(at));
+                let free_from = crate::mutant!("far-end-waits-since-it-was-asked", free, at);
+                Some(Turn { free_from, place: 1 })
+            }
+        };
+        Place { turn, begins: self.owed.iter().map(|owed| owed.until).max().filter(|_| in_turn) }
     }
 
     /// Until when a request waits. `reads`: it is a read of a drive that answers, or of any where none does.
@@ -215,8 +268,8 @@ impl FarEnd {
     /// owed, and nothing is owed besides.
     pub(super) fn took(&self, now: Instant, number: Option<u16>) -> Option<Duration> {
         let [only] = self.owed.as_slice() else { return None };
-        let is_it = number.is_some() && only.number == number && !only.over_a_lost_port;
-        let alone = self.free_from.is_none_or(|free| free <= only.asked);
+        let is_it = number.is_some() && only.number == number;
+        let alone = only.turn == Some(Turn { free_from: only.asked, place: 1 });
         (is_it && alone).then(|| now.saturating_duration_since(only.asked))
     }
 
@@ -236,33 +289,47 @@ impl FarEnd {
             }
             _ => owed.slave == slave && (owed.shape == shape || shape.is_refusal_of(owed.shape)),
         };
-        let at = self.owed.iter().position(is_it)?;
+        // What a lost connection has asked has no number any more, and may look like it.
+        let numbered = self.owed.iter().position(|owed| number.is_some() && owed.number == number);
+        let at = numbered.or_else(|| self.owed.iter().position(is_it))?;
         let mut given_up = Vec::new();
         if self.serves < 2 {
             // One after another: what was asked before is over too.
             let before: Vec<_> = self.owed.drain(..at).collect();
-            if let Some(first) = before.first() {
-                self.saw(now, first.asked, before.len());
-                given_up.extend(before.iter().map(|owed| owed.slave));
-            }
+            self.saw(now, before.last().and_then(|last| last.turn));
+            given_up.extend(before.iter().filter_map(Owed::given_up));
         }
         let owed = self.owed.remove(if self.serves < 2 { 0 } else { at });
         if nobody {
-            self.saw(now, owed.asked, 1);
-            given_up.push(owed.slave);
+            self.saw(now, owed.turn);
+            given_up.extend(owed.given_up());
         }
         self.unproven = 0;
-        self.free_from = Some(now);
+        self.is_free(now);
         Some(given_up)
     }
 
-    /// The gateway says of what was asked at `asked` that nobody answered.
-    pub(super) fn nobody_answered(&mut self, now: Instant, asked: Instant) {
+    /// The gateway says of what is under way that nobody answered.
+    pub(super) fn nobody_answered(&mut self, now: Instant, asked: Option<Asked>) {
         self.unproven = 0;
-        if self.owed.is_empty() {
-            self.saw(now, asked, 1);
+        // What it is done with since then had another place.
+        let turn = asked.filter(|asked| self.free_from.is_none_or(|free| free <= asked.at));
+        if let Some(turn) = turn.and_then(|asked| asked.place.turn) {
+            self.saw(now, Some(turn));
         }
+        self.is_free(now);
+    }
+
+    /// It is done with something, and comes to what it owes besides. What a lost connection has asked it may have forgotten.
+    fn is_free(&mut self, now: Instant) {
         self.free_from = Some(now);
+        let mut is_known = self.serves < 2;
+        for (place, owed) in (1..).zip(&mut self.owed) {
+            is_known &= !owed.over_a_lost_port;
+            let free_from = crate::mutant!("far-end-waits-since-it-was-asked", now, owed.asked);
+            owed.turn =
+                if self.serves < 2 { is_known.then_some(Turn { free_from, place }) } else { owed.turn };
+        }
     }
 
     /// What can no longer come, as far as is known: the slaves that were asked, where it is known how long is waited for
@@ -275,7 +342,7 @@ impl FarEnd {
         self.unproven = self.unproven.saturating_add(1);
         let waits = self.seen.is_some() || self.gateway.is_some_and(|gateway| gateway.wait.is_some());
         let over = self.owed.extract_if(.., |owed| owed.until <= now);
-        over.filter(|owed| waits && !owed.over_a_lost_port).map(|owed| owed.slave).collect()
+        over.filter_map(|owed| owed.given_up().filter(|_| waits)).collect()
     }
 
     /// The connection is lost, with this question under way: a gateway that has a line may still be at it.
@@ -283,6 +350,8 @@ impl FarEnd {
         let goes_on = crate::mutant!("far-end-forgets-at-a-loss", self.exactly && self.serves < 2, false);
         if let Some(asked) = under_way.filter(|_| goes_on) {
             self.owe(asked);
+        } else if let Some(asked) = under_way {
+            self.left_until = Some(asked.at + self.wait() * 5 / 4);
         }
         if crate::mutant!("far-end-free-after-a-loss", false, true) {
             self.owed.clear();
@@ -290,28 +359,26 @@ impl FarEnd {
         for owed in &mut self.owed {
             owed.number = None;
             owed.over_a_lost_port = true;
+            // It may have been answered in time, and nobody was told.
+            owed.turn = None;
         }
     }
 
     fn done_with_all(&mut self, now: Instant) -> Vec<u8> {
         // What is served side by side shows nothing of how long each is waited for.
-        if let Some(first) = self.owed.first().filter(|_| self.serves < 2).map(|owed| owed.asked) {
-            self.saw(now, first, self.owed.len());
+        if let Some(last) = self.owed.last().filter(|_| self.serves < 2) {
+            self.saw(now, last.turn);
         }
-        let slaves = self.owed.drain(..).map(|owed| owed.slave).collect();
-        self.free_from = Some(now);
+        let slaves = self.owed.drain(..).filter_map(|owed| owed.given_up()).collect();
+        self.is_free(now);
         slaves
     }
 
-    /// So many questions, the first of them asked at `asked`, were over at `now`, for want of an answer.
-    fn saw(&mut self, now: Instant, asked: Instant, questions: usize) {
-        let began = crate::mutant!(
-            "far-end-waits-since-it-was-asked",
-            self.free_from.map_or(asked, |free| free.max(asked)),
-            asked
-        );
-        let shares = crate::mutant!("far-end-waits-for-one", u32::try_from(questions).unwrap_or(1).max(1), 1);
-        let waited = now.saturating_duration_since(began) / shares;
+    /// The question of this turn was over at `now`, for want of an answer, and so was what stood before it.
+    fn saw(&mut self, now: Instant, turn: Option<Turn>) {
+        let Some(Turn { free_from, place }) = turn else { return };
+        let waits = crate::mutant!("far-end-waits-for-one", place.max(1), 1);
+        let waited = now.saturating_duration_since(free_from) / waits;
         if waited > Duration::ZERO {
             self.seen = Some(waited);
         }
@@ -325,14 +392,18 @@ mod tests {
     const SECOND: Duration = Duration::from_secs(1);
     const MS: Duration = Duration::from_millis(1);
 
-    fn asked(slave: u8, number: u16, at: Instant) -> Asked {
-        Asked { slave, number: Some(number), shape: Shape::ANY, at }
+    fn asked(far: &FarEnd, slave: u8, number: u16, at: Instant) -> Asked {
+        Asked { slave, number: Some(number), shape: Shape::ANY, at, place: far.place(at) }
+    }
+
+    fn owe(far: &mut FarEnd, slave: u8, number: u16, at: Instant) {
+        far.owe(asked(far, slave, number, at));
     }
 
     #[test]
     fn nothing_is_owed_where_nothing_is_in_between() {
         let mut far = FarEnd::new(None);
-        far.owe(asked(1, 1, Instant::now()));
+        owe(&mut far, 1, 1, Instant::now());
         assert_eq!((far.owes(), far.gate(true), far.stop_waits()), (0, None, Duration::ZERO));
     }
 
@@ -340,10 +411,10 @@ mod tests {
     fn one_living_drive_is_read_to_see_and_nothing_is_written_meanwhile() {
         let now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway::default()));
-        far.owe(asked(1, 1, now));
+        owe(&mut far, 1, 1, now);
         assert_eq!(far.gate(true), None);
         assert!(far.gate(false).is_some());
-        far.owe(asked(2, 2, now));
+        owe(&mut far, 2, 2, now);
         assert!(far.gate(true).is_some(), "two are enough");
     }
 
@@ -351,11 +422,11 @@ mod tests {
     fn what_is_answered_at_once_beside_a_question_in_vain_shows_that_it_does_more_at_once() {
         let now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway::default()));
-        far.owe(asked(1, 1, now));
+        owe(&mut far, 1, 1, now);
         assert!(far.answered(now + 20 * MS, 1, true).is_empty());
         assert_eq!((far.gate(false), far.held_up(now)), (None, Duration::ZERO));
         assert!(!far.holds_others_up());
-        far.owe(asked(3, 2, now));
+        owe(&mut far, 3, 2, now);
         assert!(far.gate(false).is_some(), "of three at once nothing is known");
         assert_eq!(far.gate(true), None);
     }
@@ -364,7 +435,7 @@ mod tests {
     fn an_answer_at_once_when_the_far_end_may_be_done_says_nothing_of_how_much_it_does_at_once() {
         let now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway::default()));
-        far.owe(asked(1, 1, now));
+        owe(&mut far, 1, 1, now);
         // A stop, sent when the gateway had given up without a word.
         assert!(far.answered(now + 3_200 * MS, 1, true).is_empty());
         assert!(far.holds_others_up());
@@ -375,8 +446,8 @@ mod tests {
     fn an_answer_behind_two_questions_in_vain_does_not_show_that_two_are_served_at_once() {
         let now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway::default()));
-        far.owe(asked(1, 1, now));
-        far.owe(asked(2, 2, now));
+        owe(&mut far, 1, 1, now);
+        owe(&mut far, 2, 2, now);
         assert_eq!(far.answered(now + 6 * SECOND, 2, false), [1, 2]);
         assert!(far.holds_others_up());
         assert_eq!((far.wait(), far.stop_waits()), (3 * SECOND, 3 * SECOND));
@@ -387,10 +458,10 @@ mod tests {
         let now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway::default()));
         assert_eq!(far.stop_waits(), 2 * Gateway::ASSUMED_WAIT);
-        far.owe(asked(1, 1, now));
+        owe(&mut far, 1, 1, now);
         assert_eq!(far.answered(now + 2 * SECOND, 1, false), [1]);
         assert_eq!((far.wait(), far.stop_waits(), far.owes()), (2 * SECOND, 2 * SECOND, 0));
-        far.owe(asked(1, 3, now + 3 * SECOND));
+        owe(&mut far, 1, 3, now + 3 * SECOND);
         assert_eq!(far.gate(true), Some(now + 5_500 * MS));
         assert!(far.expired(now + 5_400 * MS).is_empty());
         assert_eq!(far.expired(now + 5_500 * MS), [1]);
@@ -400,8 +471,8 @@ mod tests {
     fn a_late_answer_of_known_number_ends_what_was_asked_before_it() {
         let now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), ..Gateway::default() }));
-        far.owe(asked(1, 1, now));
-        far.owe(asked(2, 2, now + SECOND));
+        owe(&mut far, 1, 1, now);
+        owe(&mut far, 2, 2, now + SECOND);
         assert_eq!(far.heard(now + 9 * SECOND, 2, Some(7), Shape::ANY, false), None);
         assert_eq!(far.heard(now + 9 * SECOND, 2, Some(2), Shape::ANY, false), Some(vec![1]));
         assert_eq!((far.owes(), far.wait()), (0, 9 * SECOND));
@@ -411,11 +482,11 @@ mod tests {
     fn a_late_answer_tells_its_own_time_only_where_nothing_held_it_up() {
         let now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway::default()));
-        far.owe(asked(1, 1, now));
+        owe(&mut far, 1, 1, now);
         assert_eq!(far.took(now + 250 * MS, Some(1)), Some(250 * MS));
         assert_eq!(far.took(now + 250 * MS, Some(2)), None, "another question's");
         assert_eq!(far.took(now + 250 * MS, None), None, "whose, nobody knows");
-        far.owe(asked(2, 2, now + 100 * MS));
+        owe(&mut far, 2, 2, now + 100 * MS);
         assert_eq!(far.took(now + 250 * MS, Some(1)), None);
         far.heard(now + 250 * MS, 1, Some(1), Shape::ANY, false);
         assert_eq!(far.took(now + 500 * MS, Some(2)), None, "it has waited behind the first");
@@ -425,7 +496,7 @@ mod tests {
     fn a_gateway_that_says_nobody_teaches_its_wait() {
         let now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway::default()));
-        far.owe(asked(1, 1, now));
+        owe(&mut far, 1, 1, now);
         assert_eq!(far.heard(now + 4 * SECOND, 1, Some(1), Shape::ANY, true), Some(vec![1]));
         assert_eq!(far.wait(), 4 * SECOND);
     }
@@ -434,19 +505,88 @@ mod tests {
     fn what_waited_in_the_gateway_is_owed_from_when_the_gateway_came_to_it() {
         let now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
-        far.owe(asked(3, 1, now));
+        owe(&mut far, 3, 1, now);
         // A stop is sent behind it; the gateway says after a second that nobody answered, and only then comes to the stop.
         assert_eq!(far.heard(now + SECOND, 3, Some(1), Shape::ANY, true), Some(vec![3]));
-        far.owe(asked(4, 2, now + 300 * MS));
+        owe(&mut far, 4, 2, now + 300 * MS);
         assert_eq!(far.gate(false), Some(now + 2_250 * MS));
+    }
+
+    #[test]
+    fn what_was_waited_for_behind_what_can_no_longer_come_has_waited_for_that_too() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
+        for (slave, at) in [(3, 0), (4, 300), (5, 600)] {
+            owe(&mut far, slave, u16::from(slave), now + at * MS);
+        }
+        assert_eq!(far.expired(now + 2_500 * MS), [3, 4]);
+        // Each was waited for a second: the answer behind the third comes when three are over.
+        assert_eq!(far.answered(now + 3 * SECOND, 1, false), [5]);
+        assert_eq!(far.wait(), SECOND);
+    }
+
+    #[test]
+    fn what_was_given_up_when_all_before_it_was_over_has_waited_behind_it_all_the_same() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
+        owe(&mut far, 3, 1, now);
+        let behind = asked(&far, 4, 2, now + 300 * MS);
+        assert_eq!(far.expired(now + 1_250 * MS), [3]);
+        far.owe(behind);
+        // Two seconds are over: both were waited for.
+        assert_eq!(far.answered(now + 2 * SECOND, 1, false), [4]);
+        assert_eq!(far.wait(), SECOND);
+    }
+
+    #[test]
+    fn a_late_answer_is_that_of_its_number_and_not_of_what_a_lost_connection_has_asked() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
+        owe(&mut far, 1, 1, now);
+        far.lost(None);
+        owe(&mut far, 1, 2, now + 10 * MS);
+        owe(&mut far, 1, 3, now + 20 * MS);
+        assert_eq!(far.heard(now + SECOND, 1, Some(2), Shape::ANY, true), Some(vec![1]));
+        assert_eq!(far.heard(now + 2 * SECOND, 1, Some(3), Shape::ANY, true), Some(vec![1]));
+        assert_eq!((far.owes(), far.wait()), (0, SECOND));
+    }
+
+    #[test]
+    fn what_is_asked_while_a_gateway_may_be_at_a_question_of_a_lost_connection_shows_nothing_of_its_time() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway::default()));
+        far.lost(Some(asked(&far, 3, 1, now)));
+        owe(&mut far, 1, 2, now + 10 * MS);
+        assert_eq!(far.took(now + SECOND, Some(2)), None);
+        far.heard(now + SECOND, 1, Some(2), Shape::ANY, false);
+        owe(&mut far, 1, 3, now + 5 * SECOND);
+        assert_eq!(far.took(now + 5_020 * MS, Some(3)), Some(20 * MS));
+    }
+
+    #[test]
+    fn what_a_lost_connection_has_asked_says_nothing_of_its_slave_nor_of_how_long_a_gateway_waits() {
+        let now = Instant::now();
+        for nobody in [false, true] {
+            let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
+            owe(&mut far, 1, 1, now);
+            // It was answered meanwhile, and nobody was told.
+            far.lost(None);
+            owe(&mut far, 3, 2, now + 10 * MS);
+            if nobody {
+                assert_eq!(far.heard(now + SECOND, 3, Some(2), Shape::ANY, true), Some(vec![3]));
+            } else {
+                assert_eq!(far.answered(now + SECOND, 2, false), [3]);
+            }
+            assert_eq!(far.wait(), SECOND, "{nobody}: not half of it");
+        }
     }
 
     #[test]
     fn a_lost_connection_ends_nothing_that_a_gateway_is_at() {
         let now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
-        far.owe(asked(3, 1, now));
-        far.lost(Some(asked(1, 2, now + 300 * MS)));
+        owe(&mut far, 3, 1, now);
+        far.lost(Some(asked(&far, 1, 2, now + 300 * MS)));
         assert_eq!(far.owes(), 2);
         assert_eq!(far.gate(true), Some(now + 1_250 * MS));
     }
@@ -455,8 +595,8 @@ mod tests {
     fn a_gateway_waits_from_when_it_came_to_a_question() {
         let now = Instant::now();
         let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
-        far.owe(asked(3, 1, now));
-        far.owe(asked(4, 2, now + 300 * MS));
+        owe(&mut far, 3, 1, now);
+        owe(&mut far, 4, 2, now + 300 * MS);
         assert_eq!(far.heard(now + SECOND, 3, Some(1), Shape::ANY, true), Some(vec![3]));
         assert_eq!(far.heard(now + 2 * SECOND, 4, Some(2), Shape::ANY, true), Some(vec![4]));
         assert_eq!(far.wait(), SECOND);
@@ -468,7 +608,7 @@ mod tests {
         let mut far = FarEnd::new(Some(Gateway { wait: Some(SECOND), ..Gateway::default() }));
         let mut limits = Vec::new();
         for number in 0..4 {
-            far.owe(asked(1, number, now));
+            owe(&mut far, 1, number, now);
             let until = far.gate(false).expect("it is owed");
             limits.push(until - now);
             now = until;

@@ -140,7 +140,7 @@ impl<C> Master<C> {
     ) -> (Result<Answer, Failure>, bool) {
         match result {
             Ok(Err(code)) if self.far_end.is_there() && u8::from(code) == NOBODY_ANSWERED => {
-                self.far_end.nobody_answered(now, flight.started);
+                self.far_end.nobody_answered(now, flight.asked());
                 (Err(Failure::Nobody), true)
             }
             result => (result, false),

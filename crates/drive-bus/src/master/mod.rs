@@ -163,7 +163,7 @@ impl<C> Flight<C> {
     fn asked(&self) -> Option<far_end::Asked> {
         let sent = self.sent.filter(|sent| sent.unanswered_until.is_none())?;
         let &Self { slave, number, shape, .. } = self;
-        Some(far_end::Asked { slave, number, shape, at: sent.end })
+        Some(far_end::Asked { slave, number, shape, at: sent.end, place: sent.place })
     }
 }
 
@@ -183,6 +183,8 @@ struct Sent {
     answer_by: Instant,
     /// When it would be due if the far end owed nothing.
     usually_by: Instant,
+    /// Behind what it waits in the far end.
+    place: far_end::Place,
     /// Nobody answers; it is over at this time.
     unanswered_until: Option<Instant>,
 }
@@ -364,6 +366,7 @@ impl<C> Master<C> {
     /// The exchange that was under way is given up for a stop.
     fn break_off(&mut self, now: Instant, flight: &Flight<C>) {
         self.exchange.abandon();
+        self.count_strays(now);
         self.to_send = None;
         self.record.ended(now, flight.slave, flight.started, Ending::GivenUp);
         self.fear_late_answer(now, flight);
@@ -403,7 +406,9 @@ impl<C> Master<C> {
     /// When the exchange that is under way gives way to a stop that waits, if it does before its time.
     fn gives_way_at(&self) -> Option<Instant> {
         let sent = self.flight.as_ref().filter(|flight| flight.behind > 0)?.sent?;
-        let first = |entry: &Entry<Asked<C>>| entry.work.is_write && entry.work.attempts == 0;
+        let first = |entry: &Entry<Asked<C>>| {
+            (entry.work.is_write && entry.work.attempts == 0).then_some(entry.arrived)
+        };
         self.schedule.first_stop(first).map(|_| sent.usually_by)
     }
 

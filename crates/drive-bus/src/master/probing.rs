@@ -120,7 +120,7 @@ impl<C> Master<C> {
     fn soonest(&self, now: Instant, idle: bool) -> Option<(u8, Instant)> {
         let wanted = |slave: u8| {
             let free = !self.aside.contains_key(&slave);
-            let at = self.wanted_probe_at(slave, idle).filter(|_| free)?;
+            let at = self.wanted_probe_at(now, slave, idle).filter(|_| free)?;
             Some((slave, at))
         };
         let first = self.probing.first.iter().filter_map(|slave| wanted(*slave)).find(|(_, at)| *at <= now);
@@ -133,15 +133,16 @@ impl<C> Master<C> {
         self.stations.get(&slave)?.doubt.over().max(Some(at))
     }
 
-    /// The same, as long as somebody cares. On an `idle` line no probe waits longer than the first.
-    fn wanted_probe_at(&self, slave: u8, idle: bool) -> Option<Instant> {
+    /// The same, as long as somebody cares: one that waits for its share of the line is nobody's any more when all have lost interest.
+    /// On an `idle` line no probe waits longer than the first.
+    fn wanted_probe_at(&self, now: Instant, slave: u8, idle: bool) -> Option<Instant> {
         let at = if idle {
             self.offline.idle_probe_at(slave, self.config.probe_backoff.0)?
         } else {
             self.offline.probe_at(slave)?
         };
         let station = self.stations.get(&slave)?;
-        station.doubt.over().max(Some(at)).filter(|at| station.is_wanted(*at))
+        station.doubt.over().max(Some(at)).filter(|at| station.is_wanted(now.max(*at)))
     }
 
     /// How long it takes until the slave that is off-line and due at `at` is probed, as far as is known.

@@ -54,7 +54,7 @@ impl<C> Master<C> {
         let free_at = self.free_at();
         let Self { exchange, stations, aside: waiting, offline, far_end, second, .. } = &*self;
         let waits = Waits { exchange: exchange.as_ref(), stations, aside: waiting, offline, far_end, second };
-        let stop_since = self.schedule.first_stop(|entry| waits.until(now, entry).is_none());
+        let stop_since = self.schedule.first_stop(|entry| waits.since(now, entry));
         let stop_at = stop_since.map(|since| self.stop_free_at(since));
         let probe = self.next_probe(now).filter(|_| stop_at.is_none() && !self.closing);
         let soonest = stop_at.unwrap_or(free_at);
@@ -130,10 +130,10 @@ impl<C> Master<C> {
         self.quiet_from + crate::mutant!("silence-unkept", self.config.silence(), std::time::Duration::ZERO)
     }
 
-    /// When a Stop that waits since `arrived` is sent at the latest, whatever is heard on the line: bytes that belong to
-    /// no exchange of ours hold it up for one frame, not for as long as somebody babbles.
-    fn stop_free_at(&self, arrived: Instant) -> Instant {
-        let heard_out = arrived.max(self.exchange_end) + self.config.silence() + self.config.longest_stray();
+    /// When a Stop that waits for nothing but the line, since then, is sent at the latest, whatever is heard there: bytes that belong
+    /// to no exchange of ours hold it up for one frame, not for as long as somebody babbles.
+    fn stop_free_at(&self, since: Instant) -> Instant {
+        let heard_out = since.max(self.exchange_end) + self.config.silence() + self.config.longest_stray();
         self.free_at().min(heard_out)
     }
 
@@ -293,6 +293,7 @@ impl<C> Master<C> {
             timeout,
             answer_by,
             usually_by,
+            place: self.far_end.place(end),
             unanswered_until: unanswered.then(|| end + self.config.broadcast_pause),
         });
         self.exchange.handle_sent(end - taken_in, answer_by);

@@ -56,6 +56,13 @@ impl<C> Waits<'_, C> {
         let second = self.second.holds(entry.slave).filter(|_| entry.work.is_write && !is_stop);
         aside.max(doubt).max(share).max(gate).max(second).filter(|until| *until > now)
     }
+
+    /// Since when a stop waits for nothing but the line: one that was sent in vain to a slave that is off-line, since its share of the
+    /// line was there. `None`: it waits for something else.
+    pub(super) fn since(&self, now: Instant, stop: &Entry<Asked<C>>) -> Option<Instant> {
+        let share = self.offline.stop_at(stop.slave);
+        self.until(now, stop).is_none().then(|| share.map_or(stop.arrived, |share| share.max(stop.arrived)))
+    }
 }
 
 impl<C> Waits<'_, C> {

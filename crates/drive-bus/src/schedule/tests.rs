@@ -286,7 +286,7 @@ proptest! {
                     prop_assert!(key.is_none() || same_key.count() == 1, "a predecessor was left behind");
                 }
                 Event::Choose => {
-                    let stops = schedule.first_stop(|_| true).is_some();
+                    let stops = schedule.first_stop(|entry| Some(entry.arrived)).is_some();
                     let background = schedule.any(|entry| entry.terms.class == Class::Background);
                     let oldest_of = |schedule: &Schedule<u32>, slave, class| {
                         let mut least = None;
