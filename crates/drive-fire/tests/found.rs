@@ -6,7 +6,10 @@ use drive_fire::{
         Cell, Event, FarEnd, Fault, Lived, Operation, Plane, Subject, Way, drive_of, live, open,
         story::Story, tell,
     },
-    model::master::{Setting, Step, lives},
+    model::{
+        Model,
+        master::{Setting, Step, lives},
+    },
 };
 
 /// A sound line to the first family.
@@ -88,6 +91,14 @@ fn no_story_that_was_a_find_is_one_again() {
     for (line, what) in [
         ("5.4.0.o5.l3.o8.o10", "freewheel behind a ramp: told at rest at 5 Hz, as if the ramp had ended"),
         ("3.4.0.o13.e14.e12", "released to the terminals, which start it: the stories were wrong"),
+        (
+            "2.2.0.f10x5.o5.o11",
+            "a 58 on UNI-TELWAY: told at rest at 0.36 Hz by a reply to an earlier question",
+        ),
+        (
+            "2.1.3.l4.l3.o7",
+            "what a 58 said behind another frame of ASCII was taken for nobody's: the stage was wrong",
+        ),
         ("8.3.0.o5.l2.o8.e10.o1.l1", "a V20 whose output is cut in a ramp: told at rest at 6.7 Hz"),
     ] {
         let story = Story::read(line).expect("it is a story");
@@ -118,5 +129,39 @@ fn a_slave_whose_answer_was_damaged_has_its_pause_before_a_stop() {
         (Setting::Wire, &[Command, Wait, Wait, Wait, Wait, Answer, Wait, Damage, Stop]),
     ] {
         assert_eq!(lives(setting, steps), Ok(()), "{setting:?}: {steps:?}");
+    }
+}
+
+/// Found by long orders of events through the master of a line.
+#[test]
+fn no_order_of_a_line_that_was_a_find_is_one_again() {
+    for (steps, what) in [
+        ("kjaehfahiila", "a stop in the pause behind a late answer in the exchange that it broke off"),
+        ("fjekiiaail", "a repeated stop sent into another's late answer"),
+        ("famiikjll", "an answer later than its window, which nobody can tell: the model was wrong"),
+        ("aheiiijialfmiikmlfccmijiajl", "a late answer whose check ends with 00h"),
+    ] {
+        assert_eq!(Model::named("master").expect("it is one").again("Wire", steps), Ok(()), "{what}");
+    }
+}
+
+/// The same through what the master knows of a gateway.
+#[test]
+fn no_order_of_a_gateway_that_was_a_find_is_one_again() {
+    for (setting, steps, what) in [
+        ("Tells", "afhehb", "asked while it was at a question, behind two lost connections"),
+        (
+            "Tells",
+            "bfjfjdgggheefjb",
+            "the same, by what looked like the answer to what a lost connection had asked",
+        ),
+        ("Silent", "fbeeih", "the same behind one"),
+        ("Silent", "jcffje", "taken to wait for more than twice as long, behind three stops"),
+        ("Silent", "aagiggeeeij", "the same"),
+        ("Silent", "fffgjjjee", "the same, of what was given up when all before it was over"),
+        ("Unknown", "ffgbbihgjgijadgj", "the only probe went to a drive that nobody asked for"),
+        ("Unknown", "hcdhjgde", "a timeout of a second, learned behind what a lost connection had asked"),
+    ] {
+        assert_eq!(Model::named("gateway").expect("it is one").again(setting, steps), Ok(()), "{what}");
     }
 }

@@ -19,7 +19,8 @@ pub(super) fn cut(way: Way, bytes: &[u8]) -> Option<Cut> {
             (crc(content) == *check).then(|| Cut { slave, pdu: pdu.to_vec(), number: [0; 2] })
         }
         Way::Ascii => {
-            let digits = bytes.strip_prefix(b":")?.strip_suffix(b"\r\n")?;
+            // Whatever stands in the place of LF: its check is over by then, and another frame may have met it there.
+            let [b':', digits @ .., b'\r', _] = bytes else { return None };
             let text = std::str::from_utf8(digits).ok()?;
             let pairs =
                 (0..text.len() / 2).map(|at| u8::from_str_radix(text.get(2 * at..2 * at + 2)?, 16).ok());
@@ -37,8 +38,11 @@ pub(super) fn cut(way: Way, bytes: &[u8]) -> Option<Cut> {
     }
 }
 
-/// What came at once, frame by frame where its length says where one ends.
+/// What came at once, frame by frame where its length, or its colon, says where one ends and the next begins.
 pub(super) fn apart(way: Way, bytes: &[u8]) -> Vec<&[u8]> {
+    if way == Way::Ascii {
+        return bytes.chunk_by(|_, next| *next != b':').collect();
+    }
     let mut frames = Vec::new();
     let mut rest = bytes;
     while way == Way::ModbusTcp
@@ -111,5 +115,27 @@ mod tests {
             assert_eq!(cut(way, &join(way, &found)), Some(found.clone()), "{way:?}");
         }
         assert_eq!(cut(Way::Rtu, &[1, 3, 2, 2, 0x41, 0xB8, 0xD4]), None);
+    }
+
+    /// Found by a story: what a second master was told stood before our own answer, and that was an answer of nobody's.
+    #[test]
+    fn what_comes_behind_another_frame_is_cut_as_if_it_had_come_alone() {
+        let one = Cut { slave: 3, pdu: vec![3, 2, 1, 0xF4], number: [0, 7] };
+        let other = Cut { pdu: vec![3, 2, 0, 0xC8], number: [0, 8], ..one.clone() };
+        for way in [Way::Ascii, Way::ModbusTcp] {
+            let expected = [&one, &other].map(|cut| Cut {
+                number: if way == Way::Ascii { [0; 2] } else { cut.number },
+                ..cut.clone()
+            });
+            let together = [join(way, &one), join(way, &other)].concat();
+            let found: Vec<_> =
+                apart(way, &together).into_iter().filter_map(|frame| cut(way, frame)).collect();
+            assert_eq!(found, expected, "{way:?}");
+        }
+        let mut met = join(Way::Ascii, &one);
+        *met.last_mut().expect("it has an end") = 0xF5;
+        assert_eq!(cut(Way::Ascii, &met), Some(Cut { number: [0; 2], ..one.clone() }));
+        let behind_noise = [b"x".as_slice(), &join(Way::Ascii, &one)].concat();
+        assert_eq!(apart(Way::Ascii, &behind_noise).len(), 2);
     }
 }

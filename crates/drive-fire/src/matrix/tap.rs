@@ -42,9 +42,17 @@ struct Plan {
     caches: bool,
     begun: Instant,
     traces: bool,
+    traces_bytes: bool,
 }
 
 impl Plan {
+    /// What UNI-TELWAY carries is no PDU: it is told as it passes, and so is everything where the variable is `bytes`.
+    fn trace_bytes(&self, way: Way, whose: &str, bytes: &[u8]) {
+        if self.traces && (way == Way::UniTelway || self.traces_bytes) {
+            eprintln!("{:8.3} s {whose} {bytes:02X?}", self.begun.elapsed().as_secs_f64());
+        }
+    }
+
     /// With `DRIVE_FIRE_TRACE` set each exchange is told, for whoever looks at one cell.
     fn trace(&self, answered: &Answered) {
         if self.traces {
@@ -74,6 +82,7 @@ impl Tap {
             caches,
             begun: Instant::now(),
             traces: std::env::var_os("DRIVE_FIRE_TRACE").is_some(),
+            traces_bytes: std::env::var_os("DRIVE_FIRE_TRACE").is_some_and(|traces| traces == "bytes"),
         };
         Self { way, plan: Arc::new(Mutex::new(plan)) }
     }
@@ -165,6 +174,7 @@ impl Cable {
             self.due.sort_by_key(|(at, _)| *at);
             while self.due.first().is_some_and(|(at, _)| *at <= now) {
                 let (_, bytes) = self.due.remove(0);
+                self.tap.plan().trace_bytes(self.tap.way, "heard late", &bytes);
                 if self.far.write_all(&bytes).await.is_err() {
                     return;
                 }
@@ -175,6 +185,7 @@ impl Cable {
     /// The master sends. False: the port is lost.
     async fn asks(&mut self, bytes: &[u8]) -> bool {
         let (way, now) = (self.tap.way, Instant::now());
+        self.tap.plan().trace_bytes(way, "sent", bytes);
         // On UNI-TELWAY polls and acknowledgements are parts of one exchange.
         let begins = way != Way::UniTelway || bytes.starts_with(&[0x10, 0x02]);
         let cut = frames::cut(way, bytes);
@@ -270,6 +281,7 @@ impl Cable {
 
     async fn answer(&mut self, bytes: &[u8]) -> bool {
         let (way, now) = (self.tap.way, Instant::now());
+        self.tap.plan().trace_bytes(way, "said", bytes);
         let speaks = way != Way::UniTelway || bytes.starts_with(&[0x10, 0x02]);
         let own = frames::cut(way, bytes);
         let mut fault = Fault::None;

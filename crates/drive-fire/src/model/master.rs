@@ -171,6 +171,10 @@ struct World {
     /// Something was on the wire when it was given.
     busy_at_stop: bool,
     setpoint: u16,
+    /// The answer that came later than the late window, by its number.
+    beyond_its_window: Option<u16>,
+    /// A read was refused, so that it is not lengthened any more.
+    refuses_longer: bool,
 }
 
 impl World {
@@ -193,6 +197,8 @@ impl World {
             stop_waits: None,
             busy_at_stop: false,
             setpoint: 0,
+            beyond_its_window: None,
+            refuses_longer: false,
         }
     }
 
@@ -252,6 +258,9 @@ impl World {
                         call.answered = true;
                     }
                     let frame = rtu::frame(late.slave, &Self::answer_of(&late));
+                    if self.now > late.end + self.config.late_window {
+                        self.beyond_its_window = Some(late.number);
+                    }
                     let at = self.now.max(self.quiet_from) + RESPONSE + SERIAL.characters(frame.len());
                     self.answered_at.insert(late.slave, at);
                     self.hears(at, &frame)?;
@@ -320,6 +329,7 @@ impl World {
             self.lost.push(asked);
             return Ok(());
         }
+        self.refuses_longer |= how == S::Refuse && asked.pdu[0] == 3;
         let pdu = match how {
             S::Refuse => vec![asked.pdu[0] | 0x80, 4],
             _ => Self::answer_of(&asked),
@@ -502,7 +512,10 @@ impl Clocked for World {
             match &outcome {
                 Ok(Ok(Response::ReadHoldingRegisters(words))) => {
                     let number = words[0] / 16;
-                    if usize::from(number) + 1 != usize::from(self.number) {
+                    // To a read that its drive refuses to have lengthened, what comes later than the late window cannot be told from
+                    // its own answer (drive-bus' README).
+                    let cannot_be_told = self.refuses_longer && self.beyond_its_window == Some(number);
+                    if usize::from(number) + 1 != usize::from(self.number) && !cannot_be_told {
                         return Err("a value is the answer to its own question");
                     }
                     if !call.answered && !call.has_twin {
