@@ -63,7 +63,7 @@ pub(super) fn shortest_frame(bytes: &[u8]) -> Option<usize> {
     let lengths = match *bytes {
         [_, 3 | 4, count, ..] => [OVERHEAD + 2 + usize::from(count), FIXED],
         [_, 5 | 6 | 15 | 16, ..] => [FIXED; 2],
-        [_, 0x80.., ..] => [OVERHEAD + 2; 2],
+        [_, 0x80..=0xFF, ..] => [OVERHEAD + 2; 2],
         _ => [0; 2],
     };
     let known = lengths.into_iter().find(|len| bytes.get(..*len).is_some_and(is_frame));
