@@ -179,8 +179,9 @@ pub(super) fn also(facts: &Facts, about: &RecordView, asked: Asked) -> Vec<Sente
     for (_, begins, found) in others.into_iter().take(ALSO) {
         let away = begins - super::facts::begins(about);
         let side = if away < 0 { "earlier" } else { "later" };
-        let text = format!("{} {side}: {}", lasting(away.abs()), facts.in_words(found));
-        said.push(Sentence::of(Certainty::Seen, text).at(found.time_unix_ms));
+        let began = began(found);
+        let text = format!("{} {side}{began}: {}", lasting(away.abs()), facts.in_words(found));
+        said.push(Sentence::of(Certainty::Seen, text).at(begins));
         let why = causes(facts, found).into_iter().next();
         let is_new = |why: &Sentence| found.kind != "command" && !why.text.contains(&facts.in_words(found));
         said.extend(why.filter(is_new).map(|why| Sentence { text: format!("to that: {}", why.text), ..why }));
@@ -211,6 +212,7 @@ pub(super) fn beside(
             found.number != number
                 && found.time_unix_ms != moment
                 && is_told(*weight, *begins)
+                && !told.iter().any(|one| one.time_unix_ms == Some(*begins))
                 && !told.iter().any(|one| one.time_unix_ms == Some(found.time_unix_ms))
         })
     };
@@ -222,8 +224,14 @@ pub(super) fn beside(
         .filter_map(|(found, side)| {
             let (_, begins, found) = found?;
             let away = lasting((begins - moment).abs());
-            let text = format!("{word}{side} it, {away} away: {}", facts.in_words(found));
-            Some(Sentence::of(Certainty::Seen, text).at(found.time_unix_ms))
+            let began = began(found);
+            let text = format!("{word}{side} it, {away} away{began}: {}", facts.in_words(found));
+            Some(Sentence::of(Certainty::Seen, text).at(begins))
         })
         .collect()
+}
+
+/// That only the beginning of something is meant, which was told later.
+fn began(found: &RecordView) -> &'static str {
+    if begins(found) < found.time_unix_ms { ", this began" } else { "" }
 }

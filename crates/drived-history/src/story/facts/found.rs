@@ -62,6 +62,17 @@ impl Facts {
         if can && self.was_ending(found).is_none() { cause } else { Some(Cause::Drive) }
     }
 
+    /// The begin of a run that somebody here had asked for, which went on when the program was killed, where it is told of that run that it was
+    /// not taken over.
+    pub(in crate::story) fn begun_before_kill(&self, found: &RecordView) -> Option<&RecordView> {
+        let mut before = self.records.iter().rev().filter(|other| other.number < found.number);
+        before.by_ref().find(|other| other.kind == "history" && other.what == "began_after_kill")?;
+        let last = before.find(|other| other.what == "state_changed" && other.drive == found.drive)?;
+        let Body { to, cause, .. } = body(last);
+        let is_begun = to.as_deref() == Some("running") && matches!(cause, Some(Cause::Command { .. }));
+        (is_begun && found.what == "run_not_adopted").then_some(last)
+    }
+
     /// The trip by which the output of a drive was off when its stop was confirmed: the stop did not bring it to a standstill.
     pub(in crate::story) fn trip_behind(&self, confirmed: &RecordView) -> Option<&RecordView> {
         let own = self.records.iter().rev().filter(|found| {

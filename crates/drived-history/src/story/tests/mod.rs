@@ -3,6 +3,7 @@
 
 mod causes;
 mod certain;
+mod moment;
 mod nights;
 mod outsider;
 mod returns;
@@ -19,6 +20,7 @@ use drived_config::{
 };
 use drived_plant::plant::{
     commands::{Action, Request, Target},
+    past::Certainty,
     testing::TestPlant,
 };
 use tokio::{
@@ -26,7 +28,7 @@ use tokio::{
     time::{Instant, sleep},
 };
 
-use super::{Certainty, Story, tell};
+use super::{Story, tell};
 use crate::{
     listen::{Clocks, Listening},
     quantity::{Quantity, Set},
