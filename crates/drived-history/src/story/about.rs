@@ -4,7 +4,7 @@ use drived_plant::plant::past::{Certainty, RecordView, SentenceView as Sentence}
 
 use super::{
     body::{Cause, body},
-    cause::causes,
+    cause::{causes, headline},
     facts::{Facts, begins, lasting},
 };
 
@@ -179,9 +179,9 @@ pub(super) fn also(facts: &Facts, about: &RecordView, asked: Asked) -> Vec<Sente
     for (_, begins, found) in others.into_iter().take(ALSO) {
         let away = begins - super::facts::begins(about);
         let side = if away < 0 { "earlier" } else { "later" };
-        let began = began(found);
-        let text = format!("{} {side}{began}: {}", lasting(away.abs()), facts.in_words(found));
-        said.push(Sentence::of(Certainty::Seen, text).at(begins));
+        let (began, head) = (began(found), headline(facts, found));
+        let text = format!("{} {side}{began}: {}", lasting(away.abs()), head.text);
+        said.push(Sentence::of(head.certainty, text).at(begins));
         let why = causes(facts, found).into_iter().next();
         let is_new = |why: &Sentence| found.kind != "command" && !why.text.contains(&facts.in_words(found));
         said.extend(why.filter(is_new).map(|why| Sentence { text: format!("to that: {}", why.text), ..why }));
@@ -224,9 +224,9 @@ pub(super) fn beside(
         .filter_map(|(found, side)| {
             let (_, begins, found) = found?;
             let away = lasting((begins - moment).abs());
-            let began = began(found);
-            let text = format!("{word}{side} it, {away} away{began}: {}", facts.in_words(found));
-            Some(Sentence::of(Certainty::Seen, text).at(begins))
+            let (began, head) = (began(found), headline(facts, found));
+            let text = format!("{word}{side} it, {away} away{began}: {}", head.text);
+            Some(Sentence::of(head.certainty, text).at(begins))
         })
         .collect()
 }

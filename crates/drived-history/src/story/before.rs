@@ -23,6 +23,8 @@ const WITH_IT_MS: i64 = 150;
 const LATE_MS: i64 = 1_000;
 /// A value is known for so long behind its reading.
 const HELD_MS: i64 = 3_000;
+/// An output that is off for longer is that of a motor that is told to stand.
+const OFF_MS: i64 = 5_000;
 /// The slow set is read at least every so often, unless it is set up otherwise.
 pub(super) const SLOW_MS: i64 = 15_000;
 
@@ -64,14 +66,23 @@ pub(super) fn before(
         ),
         None => Sentence::of(Certainty::Seen, format!("{values} (as the poll before showed it)")),
     }];
-    if let Some(fall) = fall.filter(|fall| shown.is_none_or(|shown| fall.since < shown)) {
-        let states = self::states(connection, facts, fall.since - MINUTE_MS, fall.since)?;
-        let values = self::values(connection, facts, &states, fall.since - 1)?.join(", ");
+    let fell = fall.map(|fall| fall.since).filter(|since| shown.is_none_or(|shown| *since < shown));
+    if let Some(fell) = fell.or_else(|| off_since(facts, &states, seen)) {
+        let states = self::states(connection, facts, fell - MINUTE_MS, fell)?;
+        let values = self::values(connection, facts, &states, fell - 1)?.join(", ");
         let text = format!("before its output was read lower: {values}");
-        let first = Sentence::of(Certainty::Seen, text).at(fall.since);
+        let first = Sentence::of(Certainty::Seen, text).at(fell);
         said.extend(Some(first).filter(|_| !values.is_empty()));
     }
     Ok(said)
+}
+
+/// Since when the output of a motor that was read as running was read as off: what was read with it is of a moment at which its run had ended.
+fn off_since(facts: &Facts, states: &[Point], at: i64) -> Option<i64> {
+    let state = stands_since(states, at)?;
+    let (since, _) = facts.output_since(at).filter(|(_, output)| *output == Some(0))?;
+    let runs = Quantity::STATE.text(state.count?) == "running";
+    (runs && since > state.at && at - since <= OFF_MS).then_some(since)
 }
 
 /// Its states, each from its moment on, and since when nothing is known.

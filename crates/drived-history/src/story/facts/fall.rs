@@ -46,9 +46,14 @@ impl Fall {
 }
 
 impl Facts {
-    /// Its output at a moment.
+    /// Its output at a moment,
     pub(in crate::story) fn output_at(&self, at: i64) -> Option<i64> {
-        self.outputs.iter().rev().find(|(since, _)| *since <= at).and_then(|(_, count)| *count)
+        self.output_since(at)?.1
+    }
+
+    /// and since when it had been that.
+    pub(in crate::story) fn output_since(&self, at: i64) -> Option<(i64, Option<i64>)> {
+        self.outputs.iter().rev().find(|(since, _)| *since <= at).copied()
     }
 
     /// That the output was falling at a moment, or fell with it, by more than this share of a hundred.

@@ -130,10 +130,25 @@ fn state_and_output_of_a_trip_that_was_told_late_are_of_one_reading() {
     );
 }
 
-/// A pump without supply for 1.5 s: lost for 1.9 s at 374.586 s, heard again at 375.668 s.
+/// A fan of which one reading had 0.00 Hz and running, and the next one its fault.
 #[test]
-fn what_was_read_before_a_short_silence_is_not_told_as_of_the_poll_before() {
-    let mut night = Written::begin("moment-short");
+fn a_reading_of_an_output_that_was_off_already_is_told_with_how_it_was_before_that() {
+    let mut night = Written::begin("moment-off-already");
+    night.read(&[(200_340, RUNNING, 3_000), (326_840, RUNNING, 0), (328_187, FAULT, 0)], 400_000);
+    night.event(328_465, "tripped", "tripped: OL1: inverter overload", None);
+    let story = night.told(328_000);
+    assert!(story.before[0].text.starts_with("running, output 0.00 Hz"), "{:?}", story.before);
+    let first = story.before.get(1).expect("how it was when its output was on");
+    assert!(
+        first.text.starts_with("before its output was read lower: running, output 30.00 Hz"),
+        "{first:?}"
+    );
+    assert_eq!(first.time_unix_ms, Some(NIGHT_MS + 326_840), "{first:?}");
+}
+
+/// A pump without supply for 1.5 s: lost for 1.9 s at 374.586 s, heard again at 375.668 s.
+fn without_supply_for_a_moment(name: &str) -> Written {
+    let mut night = Written::begin(name);
     let mut tracker = Tracker::default();
     for at in (200_170..373_000).step_by(500).chain((375_600..400_000).step_by(500)) {
         let (state, output) = if at < 374_000 { (RUNNING, 3_000) } else { (READY, 0) };
@@ -147,10 +162,26 @@ fn what_was_read_before_a_short_silence_is_not_told_as_of_the_poll_before() {
     night.event(375_668, "state_changed", "state changed: running to ready", Some(body));
     let text = "command overridden: another word, or a power cycle, that took the place of the run command";
     night.event(375_668, "command_overridden", text, None);
-    let story = night.told(375_600);
+    night
+}
+
+#[test]
+fn what_was_read_before_a_short_silence_is_not_told_as_of_the_poll_before() {
+    let story = without_supply_for_a_moment("moment-short").told(375_600);
     assert!(story.before[0].text.starts_with("running, output 30.00 Hz"), "{:?}", story.before);
     assert!(story.before[0].text.ends_with("(as it was read last, 3.0 s before)"), "{:?}", story.before);
     assert_eq!(story.before[0].time_unix_ms, Some(NIGHT_MS + 372_686), "{:?}", story.before);
+}
+
+#[test]
+fn a_run_command_that_went_with_its_supply_is_told_so_beside_another_moment_too() {
+    let story = without_supply_for_a_moment("moment-beside").told(390_500);
+    let likely = story.why(Certainty::Likely);
+    assert!(
+        likely.contains("next before it, 14.8 s away: its run command went with its supply"),
+        "{story:?}"
+    );
+    assert!(!format!("{:?}", story.why).contains("another word, or a power cycle"), "{story:?}");
 }
 
 /// The mains of the plant was away from 303.0 to 308.0 s; a V20 then shows a run command that is not in force.
