@@ -3,6 +3,7 @@
 
 mod causes;
 mod certain;
+mod doings;
 mod moment;
 mod nights;
 mod outsider;
