@@ -57,6 +57,10 @@ pub(super) fn before(
             let text = format!("{values} (as it was read last, {} before)", lasting(moment - seen));
             Sentence::of(Certainty::Seen, text).at(seen)
         }
+        _ if about.is_some_and(|about| facts.is_found_unanswered(about.time_unix_ms)) => {
+            let text = format!("{values} (as it was read last; a poll behind that was not answered)");
+            Sentence::of(Certainty::Seen, text)
+        }
         Some(shown) => Sentence::of(
             Certainty::Seen,
             format!(

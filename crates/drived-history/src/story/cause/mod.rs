@@ -13,6 +13,7 @@
 //! | its supply | likely | it was silent, and its run command was gone when it was seen again |
 //! | its supply, and not what a block is by | likely | it was silent, others fell silent with it and did not run on, and its output was off when it was heard again |
 //! | that this program stopped it | likely | the run command was one that it had given before it was killed, and it was ending |
+//! | its supply | likely | a poll was not answered, and its run command was gone when it was seen again |
 //! | its cable, and not its supply | likely | it was silent, and when it was heard again it ran on by a bus, or its watchdog had acted |
 //! | its supply, and no other word | likely | its reference went to 0 with its run command |
 //! | another word, and no power cycle | likely | its run command went, and its reference stayed |

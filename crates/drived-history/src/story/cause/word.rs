@@ -46,6 +46,10 @@ pub(super) fn how_it_went(facts: &Facts, gone: &RecordView) -> Went {
         let text = "when it was seen again its run command was gone, as it is behind a loss of supply: its supply was away";
         return Went::Unfed(Sentence::of(Likely, text).at(at));
     }
+    if facts.is_found_unanswered(at) {
+        let text = "a poll of it had not been answered, and when it was seen again its run command was gone, as it is behind a loss of supply: its supply was away";
+        return Went::Unfed(Sentence::of(Likely, text).at(at));
+    }
     // That no silence was told tells nothing: a drive is off and on again between two looks at it.
     let is_heard = is_open && facts.is_heard(at - HEARD_MS, at);
     Went::Open(is_heard.then(|| {

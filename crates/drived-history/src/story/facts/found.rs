@@ -7,6 +7,9 @@ use super::{
     Facts, SEEN_AGAIN_MS,
 };
 
+/// What is told of one reading is recorded within this time.
+const SAME_READING_MS: i64 = 150;
+
 impl Facts {
     /// Whether a record is of this drive: what happened to it, or a command that was for it too.
     pub(in crate::story) fn is_of_drive(&self, found: &RecordView) -> bool {
@@ -19,6 +22,19 @@ impl Facts {
     pub(in crate::story) fn is_refused(&self, found: &RecordView) -> bool {
         let rest = || found.text.strip_prefix(&*self.drive);
         found.what == "command_refused" && rest().is_some_and(|rest| rest.starts_with(": "))
+    }
+
+    /// Whether what it showed with something was found so behind a poll that was not answered, without which it is not told as found: one that
+    /// is heard for the first time, or again, is told as that.
+    pub(in crate::story) fn is_found_unanswered(&self, at: i64) -> bool {
+        let of_reading = |found: &&RecordView| {
+            found.drive.as_deref() == Some(&*self.drive) && (found.time_unix_ms - at).abs() <= SAME_READING_MS
+        };
+        let with_it = || self.records.iter().filter(of_reading);
+        let is_found = |found: &RecordView| {
+            found.what == "state_changed" && matches!(body(found).cause, Some(Cause::Found))
+        };
+        with_it().any(is_found) && !with_it().any(|found| found.what == "connected")
     }
 
     /// What became of a command for several at this drive.

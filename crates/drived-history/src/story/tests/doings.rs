@@ -146,6 +146,30 @@ fn an_output_that_was_gone_from_one_reading_to_the_next_had_not_been_falling() {
     assert!(!open.contains("heard all the time") && open.contains("less than two polls"), "{story:?}");
 }
 
+/// The same fan as it was: a poll went unanswered, and what it showed then was found so.
+#[test]
+fn a_run_command_that_was_gone_behind_a_poll_without_an_answer_likely_went_with_the_supply() {
+    let mut night = Written::begin("doings-unanswered");
+    night.read(&[(200_418, RUNNING, 3_000), (336_918, READY, 0)], 360_000);
+    let body = json!({ "from": "running", "to": "ready", "cause": { "by": "found" } });
+    night.event(337_369, "state_changed", "state changed: running to ready", Some(body));
+    let text = "command overridden: another word, or a power cycle, that took the place of the run command";
+    night.event(337_369, "command_overridden", text, None);
+    let story = night.told(335_000);
+    let about = story.about.as_ref().unwrap();
+    assert_eq!(about.certainty, Certainty::Likely, "{about:?}");
+    assert!(about.text.contains("with its supply"), "{about:?}");
+    let likely = story.why(Certainty::Likely);
+    assert!(likely.contains("had not been answered") && likely.contains("its supply was away"), "{story:?}");
+    assert!(!story.why(Certainty::NotKnown).contains("no silence of it was told"), "{story:?}");
+    assert!(story.before[0].text.starts_with("running, output 30.00 Hz"), "{:?}", story.before);
+    assert!(
+        story.before[0].text.ends_with("(as it was read last; a poll behind that was not answered)"),
+        "{:?}",
+        story.before
+    );
+}
+
 /// A drive whose silence began at 315.3 s and was told at 316.58 s; somebody's start was told at 316.19 s.
 #[test]
 fn what_was_told_behind_a_moment_is_not_before_it() {
