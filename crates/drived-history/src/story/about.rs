@@ -150,8 +150,8 @@ pub(super) fn about(facts: &Facts, asked: Asked) -> Option<&RecordView> {
     then.or_else(near).or_else(unseen).or_else(soon).map(|(_, _, found)| found)
 }
 
-/// What else happened then, in its order: each with what is told first of why.
-pub(super) fn also(facts: &Facts, about: &RecordView, asked: Asked) -> Vec<Sentence> {
+/// What else happened then, and is not told of why, in its order: each with what is told first of why.
+pub(super) fn also(facts: &Facts, about: &RecordView, asked: Asked, why: &[Sentence]) -> Vec<Sentence> {
     let (from, to) = match asked.from == asked.to {
         true => (asked.from - ALSO_BEFORE_MS, asked.to + ALSO_AFTER_MS),
         false => (asked.from, asked.to),
@@ -173,6 +173,10 @@ pub(super) fn also(facts: &Facts, about: &RecordView, asked: Asked) -> Vec<Sente
         }
     }
     let mut others = told.split_off(1);
+    others.retain(|(_, _, found)| {
+        let words = facts.in_words(found);
+        !why.iter().any(|one| one.time_unix_ms == Some(found.time_unix_ms) && one.text.contains(&words))
+    });
     others.sort_by_key(|(_, begins, found)| (*begins, found.number));
     let more = others.len().saturating_sub(ALSO);
     let mut said = Vec::new();

@@ -55,7 +55,7 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
         None => moved.first().filter(|_| has_moved).cloned(),
     };
     why.extend(moved);
-    let also = about.map(|about| also(&facts, about, asked)).unwrap_or_default();
+    let also = about.map(|about| also(&facts, about, asked, &why)).unwrap_or_default();
     why.extend(also);
     let beside = beside(&facts, about, moment, &why);
     why.extend(beside);

@@ -120,7 +120,10 @@ fn a_motor_that_stopped_when_the_terminals_had_the_command_is_not_told_as_stoppe
     let text = "command overridden: another run command, which took the place of the one that was given, decides instead: see which master has given it, and stop the motor unless it is to run";
     night.event(303_299, "command_overridden", text, None);
     night.changed(307_287, "stopping", "ready", "drive");
-    let told = format!("{:?}", night.told(307_000));
+    let story = night.told(306_000);
+    let shown = story.why.iter().filter(|one| one.text.contains("command overridden"));
+    assert_eq!(shown.count(), 1, "it is told once: {:?}", story.why);
+    let told = format!("{story:?}");
     assert!(told.contains("stopping to ready") && told.contains("commanded by terminals"), "{told}");
     assert!(!told.contains("stopped at the drive") && !told.contains("another run command"), "{told}");
 }
