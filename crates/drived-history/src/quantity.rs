@@ -35,6 +35,8 @@ impl Set {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Quantity(pub u32);
 
+/// The number of the first quantity of the slow set.
+const MEASURED: u32 = 10;
 /// The first number of a word; the word's address is added to it.
 const WORDS: u32 = 0x1_0000;
 /// Likewise of a word that is a number by the manual, such as a measured current: it moves all the time.
@@ -258,6 +260,14 @@ impl Quantity {
     }
 }
 
+impl Quantity {
+    /// Whether it is one of the slow set, which is read more rarely than the state.
+    #[must_use]
+    pub const fn is_measured(self) -> bool {
+        self.0 >= MEASURED && self.0 < MEASURED + 20
+    }
+}
+
 impl fmt::Display for Quantity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.row() {
@@ -337,7 +347,7 @@ pub fn of_measurements(measured: &Measurements) -> Vec<(Quantity, i64)> {
         measured.inputs.map(i64::from),
         measured.outputs.map(i64::from),
     ];
-    numbered(10, known).collect()
+    numbered(MEASURED, known).collect()
 }
 
 /// Those that are known, with their numbers from the first on.

@@ -4,7 +4,7 @@ use drived_plant::plant::past::{Certainty, RecordView, SentenceView as Sentence}
 
 use super::{
     body::{Cause, body},
-    cause::causes,
+    cause::{causes, headline},
     facts::{Facts, begins, lasting},
 };
 
@@ -150,8 +150,8 @@ pub(super) fn about(facts: &Facts, asked: Asked) -> Option<&RecordView> {
     then.or_else(near).or_else(unseen).or_else(soon).map(|(_, _, found)| found)
 }
 
-/// What else happened then, in its order: each with what is told first of why.
-pub(super) fn also(facts: &Facts, about: &RecordView, asked: Asked) -> Vec<Sentence> {
+/// What else happened then, and is not told of why, in its order: each with what is told first of why.
+pub(super) fn also(facts: &Facts, about: &RecordView, asked: Asked, why: &[Sentence]) -> Vec<Sentence> {
     let (from, to) = match asked.from == asked.to {
         true => (asked.from - ALSO_BEFORE_MS, asked.to + ALSO_AFTER_MS),
         false => (asked.from, asked.to),
@@ -173,14 +173,19 @@ pub(super) fn also(facts: &Facts, about: &RecordView, asked: Asked) -> Vec<Sente
         }
     }
     let mut others = told.split_off(1);
+    others.retain(|(_, _, found)| {
+        let words = facts.in_words(found);
+        !why.iter().any(|one| one.time_unix_ms == Some(found.time_unix_ms) && one.text.contains(&words))
+    });
     others.sort_by_key(|(_, begins, found)| (*begins, found.number));
     let more = others.len().saturating_sub(ALSO);
     let mut said = Vec::new();
     for (_, begins, found) in others.into_iter().take(ALSO) {
         let away = begins - super::facts::begins(about);
         let side = if away < 0 { "earlier" } else { "later" };
-        let text = format!("{} {side}: {}", lasting(away.abs()), facts.in_words(found));
-        said.push(Sentence::of(Certainty::Seen, text).at(found.time_unix_ms));
+        let (began, head) = (began(found), headline(facts, found));
+        let text = format!("{} {side}{began}: {}", lasting(away.abs()), head.text);
+        said.push(Sentence::of(head.certainty, text).at(begins));
         let why = causes(facts, found).into_iter().next();
         let is_new = |why: &Sentence| found.kind != "command" && !why.text.contains(&facts.in_words(found));
         said.extend(why.filter(is_new).map(|why| Sentence { text: format!("to that: {}", why.text), ..why }));
@@ -211,6 +216,7 @@ pub(super) fn beside(
             found.number != number
                 && found.time_unix_ms != moment
                 && is_told(*weight, *begins)
+                && !told.iter().any(|one| one.time_unix_ms == Some(*begins))
                 && !told.iter().any(|one| one.time_unix_ms == Some(found.time_unix_ms))
         })
     };
@@ -222,8 +228,14 @@ pub(super) fn beside(
         .filter_map(|(found, side)| {
             let (_, begins, found) = found?;
             let away = lasting((begins - moment).abs());
-            let text = format!("{word}{side} it, {away} away: {}", facts.in_words(found));
-            Some(Sentence::of(Certainty::Seen, text).at(found.time_unix_ms))
+            let (began, head) = (began(found), headline(facts, found));
+            let text = format!("{word}{side} it, {away} away{began}: {}", head.text);
+            Some(Sentence::of(head.certainty, text).at(begins))
         })
         .collect()
+}
+
+/// That only the beginning of something is meant, which was told later.
+fn began(found: &RecordView) -> &'static str {
+    if begins(found) < found.time_unix_ms { ", this began" } else { "" }
 }

@@ -13,6 +13,8 @@ use crate::{read::parameters, store::StoreError};
 pub(super) const BEFORE_MS: i64 = 120_000;
 /// to so long after it is told what happened.
 pub(super) const AFTER_MS: i64 = 300_000;
+/// What is recorded within this time is recorded in any order.
+const MOMENT_MS: i64 = 100;
 /// So many sentences at the most.
 const COURSE: usize = 60;
 
@@ -48,11 +50,25 @@ pub(super) fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
     let first = told.iter().take(COURSE).enumerate();
     let mut course: Vec<Sentence> =
         first.map(|(place, found)| sentence(facts, found, with_words(place, found))).collect();
+    in_order(&mut course);
     if told.len() > COURSE {
         let text = format!("{} more records follow: drived history tells them all", told.len() - COURSE);
         course.push(Sentence::of(Certainty::Seen, text));
     }
     course
+}
+
+/// Puts what was recorded in another order than its times within a moment in that of its times; a clock that was set back leaves the daemon's order.
+fn in_order(course: &mut [Sentence]) {
+    for end in 1..course.len() {
+        for at in (1..=end).rev() {
+            let [before, after] = [at - 1, at].map(|at| course[at].time_unix_ms.unwrap_or_default());
+            if !(1..=MOMENT_MS).contains(&(before - after)) {
+                break;
+            }
+            course.swap(at - 1, at);
+        }
+    }
 }
 
 /// Settings of the drive that were read or written here between two moments as another value than before.
@@ -129,6 +145,12 @@ fn sentence(facts: &Facts, found: &RecordView, with_words: bool) -> Sentence {
         Some((_, detail)) if found.kind == "alarm" && found.line.is_some() => {
             let over = if text.starts_with("over: ") { "over: " } else { "" };
             format!("{over}nothing was heard for {detail}")
+        }
+        _ => text,
+    };
+    let text = match found.kind == "alarm" && text.starts_with("no drive of the line answers") {
+        true if facts.stood_still_until(found.time_unix_ms) => {
+            format!("{text}: nobody had asked them, for this program stood still")
         }
         _ => text,
     };

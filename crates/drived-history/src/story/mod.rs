@@ -4,6 +4,7 @@
 //! told as likely, and one that cannot be told from another with that other.
 
 mod about;
+mod before;
 mod body;
 mod cause;
 mod course;
@@ -18,10 +19,11 @@ use rusqlite::Connection;
 pub use self::facts::AFTER_MS as LOOKED_AFTER_MS;
 use self::{
     about::{Asked, about, also, beside},
+    before::before,
     body::body,
     course::{AFTER_MS, BEFORE_MS, course, not_known, settings, with_settings},
     facts::Facts,
-    values::{before, moved},
+    values::moved,
 };
 use crate::store::StoreError;
 
@@ -53,17 +55,16 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
         None => moved.first().filter(|_| has_moved).cloned(),
     };
     why.extend(moved);
-    let also = about.map(|about| also(&facts, about, asked)).unwrap_or_default();
+    let also = about.map(|about| also(&facts, about, asked, &why)).unwrap_or_default();
     why.extend(also);
     let beside = beside(&facts, about, moment, &why);
     why.extend(beside);
-    // How it was before what is told is how it was before its output began to fall.
     let fall = about.filter(|about| shows_late(about)).and_then(|_| facts.fall_before(moment));
     Ok(Story {
         drive: drive.to_owned(),
         about: headline,
         why,
-        before: before(connection, &facts, fall.map_or(moment, |fall| fall.since))?,
+        before: before(connection, &facts, about, moment, fall)?,
         course: with_settings(course(&facts, moment), settings),
         not_known: not_known(&facts, moment, about.is_some()),
     })
@@ -72,7 +73,7 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
 /// Whether a drive may show something only when its motor has been ramping down for a while.
 fn shows_late(about: &RecordView) -> bool {
     match &*about.what {
-        "command_overridden" | "reference_taken" | "output_blocked" | "control_taken" => true,
+        "command_overridden" | "reference_taken" | "output_blocked" | "control_taken" | "tripped" => true,
         "state_changed" => body(about).from.as_deref() == Some("running"),
         _ => false,
     }

@@ -142,9 +142,7 @@ fn fed(facts: &Facts, connected: &RecordView) -> Option<Shows> {
             let text = format!("{words}: the drive itself speaks of its supply");
             return Some(Shows::Unfed(Sentence::of(Likely, text).at(at)));
         }
-        let text = format!(
-            "{words}: a watchdog acts in a drive that is fed and not spoken to, so that its supply was not away",
-        );
+        let text = "its watchdog acted, which it does in a drive that is fed and not spoken to: its supply was not away";
         return by_watchdog.then(|| Shows::Fed(Sentence::of(Likely, text).at(at)));
     }
     // Its state was the same before: else it is told that it became another.

@@ -64,7 +64,7 @@ fn stop_key(facts: &Facts, at: i64) -> Option<&RecordView> {
 }
 
 /// Others of which nothing was heard in the same time: what they share may be what was away.
-fn silent_with(facts: &Facts, at: i64) -> Vec<Sentence> {
+pub(super) fn silent_with(facts: &Facts, at: i64) -> Vec<Sentence> {
     let Some(start) = loss_before(facts, at).map(|(lost, _)| begins(lost)) else { return Vec::new() };
     let silent = facts.elsewhere("lost", start, BESIDE_MS);
     let silent: Vec<&RecordView> =
@@ -119,11 +119,13 @@ fn withdrew(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
 fn falling(facts: &Facts, about: &RecordView) -> Option<Sentence> {
     let at = about.time_unix_ms;
     let fall = facts.fall_before(at)?;
-    let text = format!(
-        "its output had been falling from {} Hz for {} when that was seen",
-        fall.from(),
-        lasting(at - fall.since)
-    );
+    let (from, ago) = (fall.from(), lasting(at - fall.since));
+    let text = match fall.step() {
+        Some(to) => {
+            format!("its output was read as {to} Hz {ago} before that was seen, and as {from} Hz before it")
+        }
+        None => format!("its output had been falling from {from} Hz for {ago} when that was seen"),
+    };
     Some(Sentence::of(Seen, text).at(fall.since))
 }
 
@@ -233,8 +235,13 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             }
             let shown = shown_before(facts, about).filter(|_| !begins_to_run);
             if let Some(shown) = shown {
-                let text =
-                    format!("it was stopped at the drive, whose own words showed it before: {}", shown.text);
+                let shown_text = facts.told(shown);
+                let text = match &*shown.what {
+                    "output_blocked" => {
+                        format!("it was stopped at the drive, whose own words showed it before: {shown_text}")
+                    }
+                    _ => format!("the drive's own words had shown before it: {shown_text}"),
+                };
                 said.push(Sentence::of(Said, text).at(shown.time_unix_ms));
             }
             let actions: &[&str] = match &*about.what {
@@ -276,7 +283,7 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                 _ if by_hand.is_some() => {
                     "who it was, or which of its inputs and keys, cannot be seen from the line"
                 }
-                _ if shown.is_some() => "who or what did it at the drive cannot be seen from the line",
+                _ if shown.is_some() => "who or what did it cannot be seen from the line",
                 "fault_cleared" => {
                     "its panel, its terminals, another master, the drive itself, or its supply that was off and on: which of them cleared it is not known"
                 }

@@ -11,6 +11,9 @@
 //! | an input | likely | the inputs were read otherwise before and after |
 //! | the time at low speed | likely | the drive names it among others, a setpoint came before, and no input changed |
 //! | its supply | likely | it was silent, and its run command was gone when it was seen again |
+//! | its supply, and not what a block is by | likely | it was silent, others fell silent with it and did not run on, and its output was off when it was heard again |
+//! | that this program stopped it | likely | the run command was one that it had given before it was killed, and it was ending |
+//! | its supply | likely | a poll was not answered, and its run command was gone when it was seen again |
 //! | its cable, and not its supply | likely | it was silent, and when it was heard again it ran on by a bus, or its watchdog had acted |
 //! | its supply, and no other word | likely | its reference went to 0 with its run command |
 //! | another word, and no power cycle | likely | its run command went, and its reference stayed |
@@ -34,6 +37,7 @@
 mod back;
 mod drive;
 mod evidence;
+mod own;
 mod silence;
 mod trip;
 mod word;
@@ -44,8 +48,9 @@ use drived_plant::plant::past::{
 };
 
 use self::{
-    drive::{at_the_drive, of_change, of_command, of_departure, of_unconfirmed_stop},
+    drive::{at_the_drive, of_change, of_command, of_departure, of_unconfirmed_stop, silent_with},
     evidence::{BESIDE_MS, SILENT_MS, TOGETHER_MS, lost_for},
+    own::{is_block_of_supply, of_blocked_by_supply, of_run_before_kill},
     silence::of_loss,
     trip::of_trip,
     word::{Went, how_it_went},
@@ -77,6 +82,12 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             Sentence::of(Likely, format!("the drive's own words speak for it: {}", about.text)),
             "a reference or a limit that was changed at the drive, or by another master: which, and who did it, cannot be seen from the line for certain",
         ),
+        "output_blocked" if is_block_of_supply(facts, about) => {
+            of_blocked_by_supply(facts, about, silent_with(facts, about.time_unix_ms))
+        }
+        "run_not_adopted" if facts.begun_before_kill(about).is_some() => {
+            of_run_before_kill(facts, about).unwrap_or_default()
+        }
         "output_blocked" | "reference_taken" | "command_overridden" | "run_not_adopted" => at_the_drive(
             facts,
             about,
@@ -108,6 +119,10 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
 /// What happened, in one line; of a run command that went, by what it went as far as that is likely.
 pub(super) fn headline(facts: &Facts, about: &RecordView) -> Sentence {
     let is_open = about.what == "command_overridden" && about.text.contains("power cycle");
+    if is_block_of_supply(facts, about) {
+        let text = "its run ended with its supply, which was away";
+        return Sentence::of(Likely, text).at(about.time_unix_ms);
+    }
     let (certainty, text) = match is_open.then(|| how_it_went(facts, about)) {
         Some(Went::Unfed(_)) => (Likely, "its run command went with its supply, which was away".to_owned()),
         Some(Went::ByWord(_)) => {

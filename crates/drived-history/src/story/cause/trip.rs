@@ -48,7 +48,6 @@ pub(super) fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         if is_found {
             said.extend(lost_before(facts, at));
         }
-        said.push(Sentence::of(NotKnown, "what brought it there (load, mains, wiring, setting) the line does not show; the values before it are below"));
         said.extend(inputs_changed(facts, at));
     }
     said.extend(beside(facts, about, is_found, by_watchdog));
@@ -63,6 +62,10 @@ pub(super) fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     });
     if let Some(departed) = departed {
         said.push(Sentence::of(Seen, format!("before it, its {}", departed.text)).at(departed.time_unix_ms));
+    }
+    if !by_watchdog {
+        let text = "what brought it there (load, mains, wiring, setting) the line does not show; the values before it are below";
+        said.push(Sentence::of(NotKnown, text));
     }
     said
 }

@@ -46,10 +46,14 @@ pub(super) fn how_it_went(facts: &Facts, gone: &RecordView) -> Went {
         let text = "when it was seen again its run command was gone, as it is behind a loss of supply: its supply was away";
         return Went::Unfed(Sentence::of(Likely, text).at(at));
     }
-    // That it was heard all the time tells nothing: a drive is off and on again between two looks at it.
+    if facts.is_found_unanswered(at) {
+        let text = "a poll of it had not been answered, and when it was seen again its run command was gone, as it is behind a loss of supply: its supply was away";
+        return Went::Unfed(Sentence::of(Likely, text).at(at));
+    }
+    // That no silence was told tells nothing: a drive is off and on again between two looks at it.
     let is_heard = is_open && facts.is_heard(at - HEARD_MS, at);
     Went::Open(is_heard.then(|| {
-        let text = "it was heard all the time: another word was written to it, as another master does, or its supply was away for less than two polls; which of them is not known";
+        let text = "no silence of it was told: another word was written to it, as another master does, or its supply was away for less than two polls; which of them is not known";
         Sentence::of(NotKnown, text)
     }))
 }

@@ -7,6 +7,9 @@ use super::{
     Facts, SEEN_AGAIN_MS,
 };
 
+/// What is told of one reading is recorded within this time.
+const SAME_READING_MS: i64 = 150;
+
 impl Facts {
     /// Whether a record is of this drive: what happened to it, or a command that was for it too.
     pub(in crate::story) fn is_of_drive(&self, found: &RecordView) -> bool {
@@ -19,6 +22,19 @@ impl Facts {
     pub(in crate::story) fn is_refused(&self, found: &RecordView) -> bool {
         let rest = || found.text.strip_prefix(&*self.drive);
         found.what == "command_refused" && rest().is_some_and(|rest| rest.starts_with(": "))
+    }
+
+    /// Whether what it showed with something was found so behind a poll that was not answered, without which it is not told as found: one that
+    /// is heard for the first time, or again, is told as that.
+    pub(in crate::story) fn is_found_unanswered(&self, at: i64) -> bool {
+        let of_reading = |found: &&RecordView| {
+            found.drive.as_deref() == Some(&*self.drive) && (found.time_unix_ms - at).abs() <= SAME_READING_MS
+        };
+        let with_it = || self.records.iter().filter(of_reading);
+        let is_found = |found: &RecordView| {
+            found.what == "state_changed" && matches!(body(found).cause, Some(Cause::Found))
+        };
+        with_it().any(is_found) && !with_it().any(|found| found.what == "connected")
     }
 
     /// What became of a command for several at this drive.
@@ -60,6 +76,17 @@ impl Facts {
             _ => true,
         };
         if can && self.was_ending(found).is_none() { cause } else { Some(Cause::Drive) }
+    }
+
+    /// The begin of a run that somebody here had asked for, which went on when the program was killed, where it is told of that run that it was
+    /// not taken over.
+    pub(in crate::story) fn begun_before_kill(&self, found: &RecordView) -> Option<&RecordView> {
+        let mut before = self.records.iter().rev().filter(|other| other.number < found.number);
+        before.by_ref().find(|other| other.kind == "history" && other.what == "began_after_kill")?;
+        let last = before.find(|other| other.what == "state_changed" && other.drive == found.drive)?;
+        let Body { to, cause, .. } = body(last);
+        let is_begun = to.as_deref() == Some("running") && matches!(cause, Some(Cause::Command { .. }));
+        (is_begun && found.what == "run_not_adopted").then_some(last)
     }
 
     /// The trip by which the output of a drive was off when its stop was confirmed: the stop did not bring it to a standstill.

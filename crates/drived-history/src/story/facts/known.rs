@@ -24,9 +24,22 @@ impl Facts {
         self.gaps.iter().rev().copied().find(|(start, end)| *start < at && at <= *end + SEEN_AGAIN_MS)
     }
 
+    /// When its output or who commands it was read otherwise than before.
+    pub(in crate::story) fn readings(&self) -> impl Iterator<Item = i64> {
+        let outputs = self.outputs.iter().filter(|(_, count)| count.is_some()).map(|(at, _)| *at);
+        outputs.chain(self.controls.iter().map(|(at, _)| *at))
+    }
+
     /// Whether it was heard all the time between two moments.
     pub(in crate::story) fn is_heard(&self, from: i64, to: i64) -> bool {
         self.spans.iter().any(|(start, end)| *start <= from && to <= *end)
+    }
+
+    /// Whether this program had been standing still until shortly before a moment.
+    pub(in crate::story) fn stood_still_until(&self, at: i64) -> bool {
+        self.records
+            .iter()
+            .any(|found| found.what == "stood_still" && (found.time_unix_ms - at).abs() <= SEEN_AGAIN_MS)
     }
 
     /// Drives of its line that were heard all the time between two moments.
@@ -121,7 +134,7 @@ pub(super) fn heard(
 }
 
 /// The times in which something is known, of points that end with nothing.
-pub(super) fn known_spans(points: &[Point]) -> Vec<(i64, i64)> {
+pub(in crate::story) fn known_spans(points: &[Point]) -> Vec<(i64, i64)> {
     let mut spans = Vec::new();
     let mut since = None;
     for point in points {

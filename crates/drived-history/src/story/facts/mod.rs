@@ -10,10 +10,11 @@ use std::collections::BTreeSet;
 use drived_plant::plant::past::{LineMinuteView, RecordView};
 use rusqlite::Connection;
 
-use self::known::{gaps, heard, known_spans};
+use self::known::{gaps, heard};
 pub(super) use self::{
+    fall::Fall,
     found::{begins, is_silent},
-    known::lasting,
+    known::{known_spans, lasting},
 };
 use super::body::body;
 use crate::{

@@ -29,6 +29,10 @@ impl Facts {
             let Commanded { by, before, .. } = commanded;
             return format!("commanded by {by} again, as before, and by {before} no longer");
         }
+        if let (Some(_), Some((_, rest))) = (self.begun_before_kill(found), text.split_once("is not ours: "))
+        {
+            return format!("run not taken over that this program had begun before it was killed: {rest}");
+        }
         let by_hand = self.control_at(at + 1).filter(|control| *control != "bus");
         if let (Some((head, _)), Some(control)) = (text.split_once(ANOTHER), by_hand) {
             return format!(

@@ -62,7 +62,8 @@ fn a_run_command_that_went_with_a_motor_that_ramps_down_went_before_that_ramp() 
     assert!(seen.contains("its output had been falling from 30.00 Hz for 1.5 s"), "{story:?}");
     assert!(seen.contains("its reference stayed at 30.00 Hz"), "{story:?}");
     assert!(story.why(Certainty::Likely).contains("another word was written to it"), "{story:?}");
-    assert!(story.before[0].text.starts_with("running, output 30.00 Hz"), "{:?}", story.before);
+    assert!(story.before[0].text.starts_with("running, output 2.90 Hz"), "{:?}", story.before);
+    assert!(story.before[1].text.contains("read lower: running, output 30.00 Hz"), "{:?}", story.before);
     let about = story.about.unwrap();
     assert_eq!(about.certainty, Certainty::Likely, "{about:?}");
     assert_eq!(about.text, "its run command went by another word that was written to it");

@@ -3,6 +3,8 @@
 
 mod causes;
 mod certain;
+mod doings;
+mod moment;
 mod nights;
 mod outsider;
 mod returns;
