@@ -347,7 +347,8 @@ impl<P: Port> Drivecom for Atv312<P> {
 
     async fn corrects_stop(&mut self) -> bool {
         let before = self.known.settings.kept(self.high_bits);
-        while !self.known.settings.knows_stop() {
+        // A drive that has no LAC never tells them, however often it is asked.
+        while !self.known.settings.knows_stop() && !self.known.settings.is_complete() {
             if self.read_setting(Class::Command).await.is_err() {
                 return false;
             }

@@ -1,7 +1,9 @@
 //! A register that this very drive lacks, which it answers by exception 02: it takes no other along.
 
+use std::{sync::mpsc, thread, time::Duration};
+
 use drive_atv312::{Atv312, CAPABILITIES, ROWS};
-use drive_core::{Drive, Row};
+use drive_core::{Drive, Error, Row, StopMode};
 use drive_testing::words::{Asked, Words};
 
 /// Stands under the bus at L1: `ETA`, `ETI`, `HSP`, `tFr`.
@@ -45,5 +47,29 @@ async fn what_is_missing_is_not_asked_for_again_until_the_drive_may_be_another()
         let alone = |asked: &&Asked| matches!(asked, Asked::Read(_, at, 1) if *at == missing);
         assert_eq!(asked.iter().filter(alone).count(), 2, "{code}: before forget and behind it");
         assert!(asked.iter().filter(|asked| asked.reads(missing)).count() <= 4, "{code}: {asked:?}");
+    }
+}
+
+/// Found by `drive-fire worlds --story 3.3.0.o14.o10.l1.o12.l7.f17x0.o9.o13.f49x2.o9.o14.o3.o5.o5.f38x2`: a stop asked its own memory
+/// for the access level for ever, and its whole thread stood still. Nobody can end that from within the thread.
+#[test]
+fn a_drive_that_tells_no_access_level_is_stopped_and_the_stop_comes_to_an_end() {
+    for mode in [StopMode::Ramp, StopMode::Fast, StopMode::Freewheel, StopMode::DcInjection] {
+        let (ended, end) = mpsc::channel();
+        thread::spawn(move || {
+            let runtime =
+                tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
+            let mut drive = without("LAC");
+            let stopped = runtime.expect("a runtime").block_on(drive.stop(mode));
+            ended.send((stopped, drive.into_port().asked)).expect("somebody waits");
+        });
+        let (stopped, asked) = end.recv_timeout(Duration::from_secs(60)).expect("the stop comes to an end");
+        let cmd = Row::find(ROWS, "CMD").unwrap().address;
+        assert!(
+            asked.iter().any(|asked| matches!(asked, Asked::Write(_, at, _) if *at == cmd)),
+            "{mode:?}: {asked:?}"
+        );
+        // These words follow no command, so that it is never confirmed.
+        assert!(matches!(stopped, Ok(_) | Err(Error::NotConfirmed { .. })), "{mode:?}: {stopped:?}");
     }
 }
