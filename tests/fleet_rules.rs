@@ -135,8 +135,9 @@ async fn rule_3_nothing_is_confirmed_that_the_machine_does_not_do() {
         let plant = Plant::single(family, |settings| {
             settings.watchdog = None;
             settings.periods.max_age = 20 * SECOND;
-            // Every loss costs the line the late window of 1 s, and a start proves what it rests on before it is written.
-            settings.times.lifetime = 4 * SECOND;
+            // Every loss costs the line the late window of 1 s, and a start proves what it rests on before its setpoint is written and
+            // once more before it is written itself.
+            settings.times.lifetime = 6 * SECOND;
         });
         plant.motor().ready(60 * SECOND).await.expect("it gets ready");
         plant.sites[0].simulated.set_faults(drive_sim::Faults::seeded(6).with(Fault::Lost, 100_000));

@@ -175,7 +175,9 @@ impl FarEnd {
         let in_turn = self.serves_in_turn();
         let before = self.owed.iter().map(|owed| owed.until).max().filter(|_| in_turn);
         let wait = crate::mutant!("far-end-gives-up-early", self.wait() * 5 / 4, self.wait() / 4);
-        let limit = wait * (1 << self.unproven.min(DOUBLINGS));
+        // What stood before it was waited for as long as it might take, and its end was proved by nothing: it is not doubled once more.
+        let is_behind_what_is_over = before.is_none() && begins.is_some();
+        let limit = if is_behind_what_is_over { wait } else { wait * (1 << self.unproven.min(DOUBLINGS)) };
         // It came to it when it was done with what it was at, which may be later than it was asked.
         let begins = before.max(begins).or(self.free_from.filter(|_| in_turn));
         let until = begins.unwrap_or(asked.at).max(asked.at) + limit;
