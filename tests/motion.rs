@@ -194,8 +194,9 @@ async fn a_start_is_not_refused_for_a_sign_that_its_own_setpoint_takes_away() {
     let mut rig = contract(Family::ATV28).rig();
     let told = rig.simulated.control(&format!("{} master LFRD -600", rig.machine.name()));
     told.expect("it takes a speed");
-    start_at(&mut rig, Direction::Forward, 40).await.expect_err("the speed turns the other way");
-    assert!(bench::written(&rig.machine, setpoint_register(Family::ATV28)).is_empty());
+    rig.drive.set_setpoint(Frequency::from_hertz(40).into()).await.ok();
+    rig.drive.start(Direction::Forward).await.expect_err("the speed turns the other way");
+    assert!(!runs(&mut rig).await);
 }
 
 #[tokio::test(start_paused = true)]

@@ -185,7 +185,8 @@ pub trait Drive: Send {
     /// has changed no speed of a motor that runs by somebody else's command. Nothing is written.
     ///
     /// # For implementors
-    /// What refuses the start itself **must** answer here, so that there is one judgement.
+    /// What refuses the start itself **must** answer here, so that there is one judgement. With a setpoint and a motor that nothing
+    /// drives, whose speed nothing can change, what costs the line questions may be left to the start.
     ///
     /// # Errors
     /// Those of [`start`](Self::start), as far as they are known before anything is written.

@@ -240,6 +240,10 @@ pub async fn may_start<D: Drivecom>(
 ) -> Result<()> {
     let (slave, command) = (drive.address(), Command::Start(direction));
     let status = drive.read_status(Class::Command).await?;
+    // A setpoint changes no speed of a motor that nothing drives: what is not seen at once is judged by its start, and only once.
+    if setpoint.is_some() && status.motion.is_undriven() && status.state != State::Fault {
+        return Ok(());
+    }
     let climb = climb_from(drive, direction, setpoint, &status).await?;
     climb.map(drop).map_err(|reason| Error::Refused { slave, command, reason })
 }
