@@ -142,14 +142,15 @@ impl Supervisor {
                     self.allow_motion(now, status, active)?;
                 }
                 self.allow_setpoint(now, setpoint)?;
-                Some(Job::SetSetpoint(setpoint, active.and_then(|active| active.before)))
+                let start = active.and_then(|active| active.before);
+                Some(Job::SetSetpoint(setpoint, start.filter(|_| !self.was_just_at_rest(now))))
             }
             Order::Start { direction, setpoint, .. } => {
                 self.allow_motion(now, status, active)?;
                 match setpoint {
                     Some(setpoint) if active.is_none_or(|active| !active.setpoint_given) => {
                         self.allow_setpoint(now, setpoint)?;
-                        Some(Job::SetSetpoint(setpoint, Some(direction)))
+                        Some(Job::SetSetpoint(setpoint, (!self.was_just_at_rest(now)).then_some(direction)))
                     }
                     // What the drive holds was given by nobody here, and may lie outside of the limits.
                     None if !self.settings.limits.is_empty() && self.given.is_none() => {
@@ -158,6 +159,16 @@ impl Supervisor {
                     _ => Some(Job::Start(direction)),
                 }
             }
+        })
+    }
+
+    /// Whether a status that is no older than a command may be has shown a sound motor that nothing drives. The setpoint of a start
+    /// changes no speed of such a one, and the drive is not asked first whether it will refuse the start: thirty that start at once
+    /// on one line have no time for a question more.
+    fn was_just_at_rest(&self, now: Instant) -> bool {
+        self.status.as_ref().is_some_and(|status| {
+            let is_new = status.age(now) <= self.settings.times.lifetime;
+            is_new && status.value.is_undriven() && !status.value.is_fault()
         })
     }
 
