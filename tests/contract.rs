@@ -13,7 +13,10 @@ use drive_testing::{
 };
 use futures_util::FutureExt;
 use support::{contracts::contract, drives};
-use tokio::{sync::watch, time::sleep};
+use tokio::{
+    sync::watch,
+    time::{Instant, sleep},
+};
 
 #[tokio::test(start_paused = true)]
 async fn whatever_a_drive_says_nothing_panics_and_only_control_words_of_its_manual_are_written() {
@@ -224,4 +227,36 @@ async fn a_witness_complains_of_what_is_told_of_a_motor_and_is_not_so_and_of_not
         }
     }
     assert_eq!(unseen, []);
+}
+
+/// What the witnesses say of a motor that is told in force by an answer that has just come, when it lost its supply for a moment since
+/// it was asked, or before that.
+async fn told_late(family: Family, is_asked_again: bool) -> Result<(), String> {
+    let mut rig = contract(family).rig();
+    let mut witnesses = Witnesses::default();
+    let (tell, told) = watch::channel(Arc::new(None));
+    witnesses.attend(&rig.machine, told, |told: &Option<Told>| told.clone());
+    let frequency = Frequency::from_hertz(20);
+    rig.drive.set_setpoint(frequency.into()).await.expect("it takes 20 Hz");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    let status = rig.until_at(frequency).await;
+    let status = Status { verdict: Some(Verdict::InForce), reference: Some(frequency), ..status };
+    rig.machine.power_cycle();
+    sleep(Duration::from_millis(30)).await;
+    if is_asked_again {
+        let _ = rig.drive.status().await;
+    }
+    let told = Told { status: Arc::new(status), at: Instant::now(), held: true };
+    tell.send_replace(Arc::new(Some(told)));
+    sleep(Duration::from_millis(100)).await;
+    let dropped = std::panic::catch_unwind(AssertUnwindSafe(|| drop(witnesses)));
+    dropped.map_err(|why| why.downcast_ref::<String>().cloned().unwrap_or_default())
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_befalls_a_machine_behind_a_question_is_not_held_against_its_answer() {
+    for family in Family::BUILT_IN {
+        assert_eq!(told_late(family, false).await, Ok(()), "{family}");
+        assert!(told_late(family, true).await.is_err(), "{family}");
+    }
 }

@@ -7,6 +7,7 @@
 use std::{
     sync::{Arc, Mutex, PoisonError},
     thread,
+    time::Duration,
 };
 
 use drive_core::Status;
@@ -17,6 +18,9 @@ use crate::{
     truth::{TOLERANCE, contradiction},
     worlds::{ByManual, Judge},
 };
+
+/// No answer that is taken is longer on its way.
+const ON_ITS_WAY: Duration = Duration::from_secs(5);
 
 /// What is told of a drive at one moment.
 #[derive(Debug, Clone)]
@@ -143,7 +147,10 @@ impl Witness {
         }
         let by_shaft = contradiction(&told.status, &self.machine.observe());
         let why = by_shaft.or_else(|| self.manual_objects(told))?;
-        Some(format!("{}: {why}", self.machine.name()))
+        let ago = |at: Instant| Instant::now().saturating_duration_since(at);
+        let happened = self.machine.interventions().last().map(|last| (last.what, ago(last.at)));
+        let told = ago(told.at);
+        Some(format!("{}: {why}; told of {told:?} ago, last befell it {happened:?} ago", self.machine.name()))
     }
 
     /// What the manual has against it, of a motor that does not come down: one that was stopped still turns for a while.
@@ -155,9 +162,14 @@ impl Witness {
         why.filter(|_| before.is_some_and(|before| turns >= before && turns > TOLERANCE))
     }
 
-    /// Whether something was done to the machine behind this moment, so that it need not be any more as it was told.
+    /// Whether something was done to the machine since it was asked for what came at this moment, so that it need not be any more as
+    /// it was told: a drive answers what it is when it is asked, and its answer may be long on its way.
     fn has_changed_since(&self, at: Instant) -> bool {
-        let touched = self.machine.interventions().last().is_some_and(|last| last.at >= at);
+        let asked = at.checked_sub(ON_ITS_WAY).map_or(at, |since| {
+            let before = self.machine.received_since(since).into_iter().map(|request| request.at);
+            before.filter(|asked| *asked <= at).max().unwrap_or(at)
+        });
+        let touched = self.machine.interventions().last().is_some_and(|last| last.at >= asked);
         let writes = |pdu: &[u8]| matches!(pdu.first(), Some(0x06 | 0x10));
         touched || self.machine.received_since(at).iter().any(|request| writes(&request.pdu))
     }

@@ -16,6 +16,7 @@ const KEEPALIVE: (Duration, Duration) = (Duration::from_secs(5), Duration::from_
 
 /// How long what was sent may go unacknowledged until the connection counts as lost; the system itself waits a quarter of an
 /// hour.
+#[cfg(target_os = "linux")]
 const UNACKNOWLEDGED: Duration = Duration::from_secs(5);
 
 /// Connects to `host:port`.

@@ -17,7 +17,9 @@ use self::{
     transmission::{Kind, Overlap, Transmission},
 };
 
-pub(crate) use self::ear::{Errors, Master};
+#[cfg(unix)]
+pub(crate) use self::ear::Errors;
+pub(crate) use self::ear::Master;
 use crate::{
     fault::{Fault, flip},
     model::Dialect,

@@ -124,6 +124,11 @@ fn command(world: &World, after: &mut World, word: u16) {
     external(world, after);
 }
 
+/// Where the chart goes to switch on disabled by the STOP key and by a stop at the terminals (p.10: transitions 9 and 12).
+const fn leaves_for_disabled(state: State) -> bool {
+    matches!(state, State::OperationEnabled | State::QuickStop)
+}
+
 /// The external fault by input or bit.
 fn external(world: &World, after: &mut World) {
     let assigned = after.word(at::ETF, 0);
@@ -219,7 +224,7 @@ fn input(world: &World, after: &mut World, bit: u8, closed: bool) {
         }
         let freewheel_with_level = assigned(at::NST) && inputs::by_level(world);
         let bus = channel::commander(world).said() == Some(Who::Bus);
-        if world.state == State::OperationEnabled && bus {
+        if bus && leaves_for_disabled(world.state) {
             after.state = State::SwitchOnDisabled;
             if freewheel_with_level && channel::bus_runs(world) {
                 after.unsure = Some(&FREEWHEEL_LEVEL);
@@ -267,7 +272,7 @@ fn key(world: &World, after: &mut World, key: Key, held: bool) {
         }
         Key::Stop if held && (keys || world.word(at::PST, 1) == 1) => {
             after.latched = None;
-            if world.state == State::OperationEnabled && by == Some(Who::Bus) {
+            if by == Some(Who::Bus) && leaves_for_disabled(world.state) {
                 after.state = State::SwitchOnDisabled;
             } else if by == Some(Who::Terminals) && inputs::by_level(world) && inputs::asks(world) {
                 after.unsure = Some(&STOP_KEY_MODE);

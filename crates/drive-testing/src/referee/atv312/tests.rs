@@ -207,6 +207,25 @@ fn the_stop_key_stops_the_bus_unless_pst_is_no() {
 }
 
 #[test]
+fn a_stop_key_and_a_stop_at_the_terminals_end_a_quick_stop() {
+    // p.10: transition 12, "STOP key on display terminal or STOP at terminals"
+    let quick_stop = write(at::CMD, 0x0002);
+    let key = running(&[]).after(&[quick_stop, Change::Key { key: Key::Stop, held: true }]);
+    let mut closed = l3(&[(at::TCC, 1)]);
+    closed.inputs = 1;
+    let terminal = closed.after(&TO_RUN).after(&[quick_stop, input(1, false)]);
+    let released = [
+        key.after(&[Change::Key { key: Key::Stop, held: false }]),
+        terminal.after(&[input(1, true)]),
+    ];
+    for world in released {
+        assert_eq!(world.state, State::SwitchOnDisabled);
+        let again = world.after(&[write(at::LFR, 300)]).after(&TO_RUN);
+        assert_eq!(explains(&again, turning(false, 3000)), Verdict::Must);
+    }
+}
+
+#[test]
 fn the_terminals_start_by_an_edge_as_delivered_and_by_a_level_with_lel() {
     // p.33
     let edge = World::factory(Family::Atv312);
