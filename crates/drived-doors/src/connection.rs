@@ -43,6 +43,8 @@ pub(super) async fn serve<S, F>(
     });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
+        // Who says no more has asked all the same, and a stop among it is carried out and answered.
+        .half_close(true)
         .header_read_timeout(HEAD_WITHIN)
         .max_headers(HEADERS)
         .max_buf_size(HEAD)

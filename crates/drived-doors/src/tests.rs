@@ -557,6 +557,19 @@ async fn stops(stream: &mut DuplexStream, bearer: &str) -> bool {
     stream.read_exact(&mut status).await.is_ok() && &status == b"HTTP/1.1 200"
 }
 
+/// RFC 9112, 9.6: who has asked may close his half, and is answered by the other. `nc -N` does.
+#[tokio::test(start_paused = true)]
+async fn whoever_says_no_more_behind_his_stop_is_answered() {
+    let rig = Rig::new("half-closed");
+    let mut stream = rig.connect();
+    let request = "POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 2\r\n\r\n{}";
+    stream.write_all(request.as_bytes()).await.unwrap();
+    stream.shutdown().await.unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).await.unwrap();
+    assert!(answer.starts_with(b"HTTP/1.1 200"), "{}", String::from_utf8_lossy(&answer));
+}
+
 #[tokio::test(start_paused = true)]
 async fn whoever_says_his_login_slowly_keeps_nobody_from_a_stop() {
     let rig = Rig::new("slow-logins");
