@@ -31,7 +31,7 @@ impl Attended {
         let status = self.drive.status().await?;
         if let Some(at) = status.at {
             let (status, held) = (Arc::new(status.clone()), self.drive.lease().is_some());
-            self.tell.send_replace(Arc::new(Some(Told { status, at, held })));
+            self.tell.send_replace(Arc::new(Some(Told { status, at, held, missing: 0 })));
         }
         Ok(status)
     }

@@ -31,6 +31,9 @@ pub struct Told {
     pub at: Instant,
     /// Whether a run command of this side is said to stand in it.
     pub held: bool,
+    /// How many of its answers have not come so far: one of them may have come since, and be taken for that to an equal question, which
+    /// no master can tell where frames have no numbers.
+    pub missing: u64,
 }
 
 /// What was said of drives, and what their machines did meanwhile.
@@ -107,7 +110,12 @@ impl Witnesses {
 fn by_fleet(snapshot: &drive_fleet::Snapshot) -> Option<Told> {
     let is_live = snapshot.link == drive_fleet::Link::Connected && !snapshot.retracted;
     let status = snapshot.status.as_ref().filter(|_| is_live)?;
-    Some(Told { status: Arc::clone(&status.value), at: status.at, held: snapshot.lease.is_some() })
+    Some(Told {
+        status: Arc::clone(&status.value),
+        at: status.at,
+        held: snapshot.lease.is_some(),
+        missing: snapshot.counters.failures,
+    })
 }
 
 impl Drop for Witnesses {
@@ -123,6 +131,7 @@ struct Witness {
     machine: SimSlave,
     manual: Option<ByManual>,
     last: Option<Instant>,
+    missing: u64,
     /// How fast it turned when the manual objected last.
     doubted: Option<i32>,
 }
@@ -133,7 +142,7 @@ impl Witness {
         let is_untouched = machine.interventions().iter().all(|done| is_set(done.what))
             && [0x06, 0x10].iter().all(|function| machine.requests(*function) == 0);
         let manual = is_untouched.then(|| ByManual::of(machine)).flatten();
-        Self { machine: machine.clone(), manual, last: None, doubted: None }
+        Self { machine: machine.clone(), manual, last: None, missing: 0, doubted: None }
     }
 
     /// What the machine, or the manual, has against it.
@@ -142,7 +151,8 @@ impl Witness {
         if let Some(manual) = &mut self.manual {
             manual.follow();
         }
-        if self.last.replace(told.at) == Some(told.at) || self.has_changed_since(told.at) {
+        let missed = std::mem::replace(&mut self.missing, told.missing) < told.missing;
+        if self.last.replace(told.at) == Some(told.at) || self.has_changed_since(told.at, missed) {
             return None;
         }
         let by_shaft = contradiction(&told.status, &self.machine.observe());
@@ -164,12 +174,12 @@ impl Witness {
 
     /// Whether something was done to the machine since it was asked for what came at this moment, so that it need not be any more as
     /// it was told: a drive answers what it is when it is asked, and its answer may be long on its way.
-    fn has_changed_since(&self, at: Instant) -> bool {
-        let asked = at.checked_sub(ON_ITS_WAY).map_or(at, |since| {
-            let before = self.machine.received_since(since).into_iter().map(|request| request.at);
-            before.filter(|asked| *asked <= at).max().unwrap_or(at)
-        });
-        let touched = self.machine.interventions().last().is_some_and(|last| last.at >= asked);
+    fn has_changed_since(&self, at: Instant, missed: bool) -> bool {
+        let earliest = at.checked_sub(ON_ITS_WAY).unwrap_or(at);
+        let asked = self.machine.received_since(earliest).into_iter().map(|request| request.at);
+        let asked = asked.filter(|asked| *asked <= at).max().unwrap_or(at);
+        let since = if missed { earliest } else { asked };
+        let touched = self.machine.interventions().last().is_some_and(|last| last.at >= since);
         let writes = |pdu: &[u8]| matches!(pdu.first(), Some(0x06 | 0x10));
         touched || self.machine.received_since(at).iter().any(|request| writes(&request.pdu))
     }

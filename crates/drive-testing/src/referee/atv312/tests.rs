@@ -214,10 +214,8 @@ fn a_stop_key_and_a_stop_at_the_terminals_end_a_quick_stop() {
     let mut closed = l3(&[(at::TCC, 1)]);
     closed.inputs = 1;
     let terminal = closed.after(&TO_RUN).after(&[quick_stop, input(1, false)]);
-    let released = [
-        key.after(&[Change::Key { key: Key::Stop, held: false }]),
-        terminal.after(&[input(1, true)]),
-    ];
+    let released =
+        [key.after(&[Change::Key { key: Key::Stop, held: false }]), terminal.after(&[input(1, true)])];
     for world in released {
         assert_eq!(world.state, State::SwitchOnDisabled);
         let again = world.after(&[write(at::LFR, 300)]).after(&TO_RUN);
