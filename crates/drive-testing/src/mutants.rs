@@ -52,11 +52,13 @@ pub enum Mutant {
     NoOutputIsStandstill,
     /// Whatever reference the motor follows, the run command is in force.
     AnyReferenceIsOurs,
+    /// Whatever speaks against a start, it may be given its setpoint.
+    AnyStartMay,
 }
 
 impl Mutant {
     /// All of them.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::StartConfirmedByAnything,
         Self::StopConfirmedByAnything,
         Self::RunTwice,
@@ -75,6 +77,7 @@ impl Mutant {
         Self::StopSentEndsTheLease,
         Self::NoOutputIsStandstill,
         Self::AnyReferenceIsOurs,
+        Self::AnyStartMay,
     ];
 
     /// The family of a contract with this fault in it.

@@ -99,7 +99,8 @@ impl Drive for Faulty {
     }
 
     async fn may_start(&mut self, direction: Direction, setpoint: Option<Setpoint>) -> Result<()> {
-        self.drive.may_start(direction, setpoint).await
+        let may = self.drive.may_start(direction, setpoint).await;
+        if self.is(Mutant::AnyStartMay) { Ok(()) } else { may }
     }
 
     fn adopt(&mut self, lease: Lease) {

@@ -18,12 +18,15 @@ const OTHER_WORD: Refusal = Refusal::Overridden {
 };
 
 impl<P: Port> Fan1<P> {
-    pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
-        let order = Order::Start(direction);
+    /// What speaks against a start, judged once: for who asks before, and for the start itself.
+    pub(crate) async fn may_be_started(&mut self, direction: Direction) -> Result<Status> {
         let status = self.read_status(Class::Command).await?;
-        if let Some(reason) = status.bars_motion().or((!remote(word(&status))).then_some(PANEL)) {
-            return Err(self.refused(order, reason));
-        }
+        let reason = status.bars_motion().or((!remote(word(&status))).then_some(PANEL));
+        reason.map_or(Ok(status), |reason| Err(self.refused(Order::Start(direction), reason)))
+    }
+
+    pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
+        let status = self.may_be_started(direction).await?;
         // One that stands and does not act would act only after it was 0 once (p. 2).
         if held(&status).contains(ControlWord::RUN) && !runs(&status) {
             self.write_control(ControlWord::empty()).await?;

@@ -48,6 +48,11 @@ impl<P: Port> Drive for Fan1<P> {
         self.start_motor(direction).await
     }
 
+    async fn may_start(&mut self, direction: Direction, _: Option<Setpoint>) -> Result<()> {
+        self.registers.begin_order();
+        self.may_be_started(direction).await.map(drop)
+    }
+
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
         self.stop_motor(mode).await
     }

@@ -28,6 +28,7 @@ impl Contract {
         complaints.extend(self.stop_before_all_else(false).await);
         complaints.extend(self.run_command_once().await);
         complaints.extend(self.reset_is_an_edge().await);
+        complaints.extend(self.who_asks_is_told_what_a_start_would_be().await);
         complaints.extend(self.forgets().await);
         complaints
     }
@@ -114,6 +115,28 @@ impl Contract {
         let resets = words.iter().filter(|word| words.last() != Some(*word)).count();
         if resets > 1 && words.iter().collect::<std::collections::BTreeSet<_>>().len() == 2 {
             stage.blame(format!("it wrote {words:04X?}: more than one edge"));
+        }
+        stage.complaints
+    }
+
+    /// Whether a start would be refused is judged as the start itself judges it, and nothing is written for it.
+    async fn who_asks_is_told_what_a_start_would_be(&self) -> Vec<Complaint> {
+        let mut stage = self.stage("whether it may start is judged as by the start itself").await;
+        for trips in [false, true] {
+            let Some(trip) = self.trip else { continue };
+            if trips {
+                stage.rig.machine.trip(trip);
+                stage.live(SETTLED).await;
+            }
+            stage.witness.from_now_on(Habit::Obeys);
+            let asked = stage.rig.drive.may_start(Direction::Forward, None).await;
+            if stage.witness.heard().iter().any(Heard::writes) {
+                stage.blame(format!("asked whether it may start, it {}", told(&stage.witness.heard())));
+            }
+            let started = stage.rig.drive.start(Direction::Forward).await.map(drop);
+            if asked != started {
+                stage.blame(format!("tripped: {trips}; it may: {asked:?}, it does: {started:?}"));
+            }
         }
         stage.complaints
     }
