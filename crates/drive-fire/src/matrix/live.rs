@@ -329,7 +329,11 @@ fn judge(
         {
             notes.object(format!("a start was refused ({error}): {seen:?}"));
         }
-        (Operation::Reset, Ok(_)) if at_once.trip.is_some() && cell.event == Event::Nothing => {
+        (Operation::Reset, Ok(status))
+            if at_once.trip.is_some()
+                && cell.event == Event::Nothing
+                && !is_of_before(status.as_ref(), ended) =>
+        {
             notes.object(format!("a reset was confirmed: {at_once:?}"));
         }
         _ => {}
