@@ -68,7 +68,7 @@ impl<C> Master<C> {
             match crate::mutant!("first-answer-believed", self.first(now), First::Nothing) {
                 First::Nothing => {}
                 First::Listen(until) => {
-                    let waits = !self.schedule.is_empty() || probe.is_some();
+                    let waits = !self.schedule.is_empty() || probe.is_some() || aside.is_some();
                     self.choose_at = waits.then_some(until);
                     return None;
                 }
