@@ -172,6 +172,8 @@ pub struct Shaft {
     descent: Descent,
     /// Since when direct current flows into a motor that may turn.
     injected_since: Option<Instant>,
+    /// Direct current was asked for since the last look: it may have taken the output, and have ended again.
+    may_inject: bool,
     /// How long the motor coasts at the most, where its owner says so.
     coast_time: Option<Duration>,
     /// How long an injection takes to bring it to rest, where its owner says so.
@@ -192,6 +194,7 @@ impl Shaft {
             past: Past::Unseen,
             descent: Descent { last: None, rate: None, falls: false },
             injected_since: None,
+            may_inject: false,
             coast_time: None,
             injection_time: None,
         }
@@ -219,6 +222,12 @@ impl Shaft {
     /// have been run by others and let coast: it is as one that was never seen.
     pub fn lose_sight(&mut self) {
         *self = Self { coast_time: self.coast_time, injection_time: self.injection_time, ..Self::new() };
+    }
+
+    /// A stop by direct current is sent. Where the next look shows neither that current nor an output, it may have flowed for a moment
+    /// between them, and a motor that turned coasts.
+    pub const fn may_inject(&mut self) {
+        self.may_inject = true;
     }
 
     /// A motor that was seen at rest may have turned since, by what was seen of it besides a status, or not seen at all: without an
@@ -256,6 +265,10 @@ impl Shaft {
             Output::Gone => Output::Cut,
             shown => shown,
         };
+        let may_inject = std::mem::take(&mut self.may_inject) && self.past != Past::AtRest;
+        if may_inject && !matches!(shown, Output::Driven | Output::Braking(_) | Output::Injection) && !turns {
+            self.past = Past::Coasts(at);
+        }
         if shown != Output::Injection {
             self.end_injection(at, matches!(shown, Output::Driven | Output::Braking(_)));
         }
@@ -388,6 +401,28 @@ mod tests {
         let (mut shaft, now) = (Shaft::new(), Instant::now());
         shaft.see(now, Output::Driven, FIFTY);
         assert_eq!(shaft.see(now, Output::None, Some(Frequency::ZERO)), Motion::Coasting);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_into_which_current_may_have_flowed_for_a_moment_between_two_looks_may_coast() {
+        let now = Instant::now();
+        let braked = |outputs: [u16; 2]| {
+            let mut shaft = Shaft::new();
+            for (tenth, hertz) in (0..).zip(outputs) {
+                let at = now + Duration::from_millis(100 * tenth);
+                shaft.see(at, Output::Braking(Frequency::from_hertz(hertz)), None);
+            }
+            shaft
+        };
+        let later = now + Duration::from_secs(10);
+        let mut shaft = braked([30, 29]);
+        assert_eq!(shaft.see(later, Output::None, Some(Frequency::ZERO)), Motion::AtRest, "its ramp is over");
+        let mut shaft = braked([30, 29]);
+        shaft.may_inject();
+        assert_eq!(shaft.see(later, Output::None, Some(Frequency::ZERO)), Motion::Coasting);
+        let mut rests = resting(now);
+        rests.may_inject();
+        assert_eq!(rests.see(later, Output::None, Some(Frequency::ZERO)), Motion::AtRest);
     }
 
     #[tokio::test(start_paused = true)]

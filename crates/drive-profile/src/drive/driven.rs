@@ -77,6 +77,9 @@ impl<P: Port> Drive for ProfileDrive<P> {
     }
 
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
+        if mode == StopMode::DcInjection {
+            self.watch.shaft.may_inject();
+        }
         self.stop_motor(mode).await
     }
 
