@@ -99,6 +99,18 @@ fn no_story_that_was_a_find_is_one_again() {
             "2.1.3.l4.l3.o7",
             "what a 58 said behind another frame of ASCII was taken for nobody's: the stage was wrong",
         ),
+        (
+            "1.0.0.e14.o5.l6.o8.f48x1.o11.o9",
+            "a 28 into which current flowed for a moment between two looks told at rest at 24 Hz",
+        ),
+        (
+            "2.2.0.f73x3.o8.o8",
+            "the stop of a 58 on UNI-TELWAY that never ended: it was put aside while a port opened anew was listened to",
+        ),
+        (
+            "4.0.0.f70x4.o5",
+            "a start that was confirmed four seconds ago, before the process stood still: the judge was wrong",
+        ),
         ("8.3.0.o5.l2.o8.e10.o1.l1", "a V20 whose output is cut in a ramp: told at rest at 6.7 Hz"),
     ] {
         let story = Story::read(line).expect("it is a story");

@@ -341,7 +341,7 @@ fn judge(
 }
 
 /// Whether a confirmation is of a second ago: it says so, and what the drive's watchdog did to one whose master stood still it does not say.
-fn is_of_before(status: Option<&Status>, ended: Instant) -> bool {
+pub(super) fn is_of_before(status: Option<&Status>, ended: Instant) -> bool {
     status.and_then(|status| status.at).is_some_and(|at| at + Duration::from_secs(1) < ended)
 }
 

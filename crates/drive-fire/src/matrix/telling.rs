@@ -8,7 +8,7 @@ use tokio::time::{Instant, sleep, timeout};
 
 use super::{
     Fault, Operation,
-    live::{Asks, Lived, PATIENCE, SETPOINT, against, operate, poll_for},
+    live::{Asks, Lived, PATIENCE, SETPOINT, against, is_of_before, operate, poll_for},
     stage::{Around, Site, Stage},
     story::{Step, Story},
 };
@@ -76,7 +76,9 @@ async fn ask(story: &Story, stage: &mut Stage, operation: Operation, done: &mut 
     let twin_runs = stage.twin.observe().running;
     let steers = seen.setpoint.abs() > TOLERANCE && seen.output_frequency.abs() > TOLERANCE;
     match (operation, &told) {
-        (Operation::Start(_), Ok(_)) if !seen.running && !done.touched => {
+        (Operation::Start(_), Ok(status))
+            if !seen.running && !done.touched && !is_of_before(status.as_ref(), Instant::now()) =>
+        {
             stage.bench.notes.object(format!("a start was confirmed: {seen:?}"));
         }
         (Operation::Start(_), Err(error))
