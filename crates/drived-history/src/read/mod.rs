@@ -7,6 +7,7 @@ mod days;
 mod frames;
 mod lines;
 mod parameters;
+mod readings;
 mod records;
 mod steps;
 mod then;
@@ -20,6 +21,7 @@ pub use self::{
     frames::{Frame, frames},
     lines::{line_minutes, lines_at},
     parameters::parameters,
+    readings::{Reading, readings},
     records::{Filter, Found, records},
     steps::{DAY_MS, QUARTER_MS, pack_steps, steps, unpack_steps},
     then::then,
