@@ -5,7 +5,7 @@ use std::{
     collections::{BTreeMap, BTreeSet},
     fmt::Display,
     sync::Arc,
-    time::{Duration, SystemTime},
+    time::Duration,
 };
 
 use drive_fleet::{DriveHandle, Snapshot};
@@ -22,6 +22,8 @@ use tokio::{
 };
 
 use crate::{
+    captured::{self, Wanted},
+    clocks::{Clocks, milliseconds},
     departure::Departure,
     errors::Errors,
     gone::Gone,
@@ -49,36 +51,6 @@ const LONGEST_BODY: usize = 256 << 10;
 /// So many of the last exchanges of its line are kept beside a trip.
 const EXCHANGES: usize = 40;
 
-/// Both clocks of the daemon.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Clocks(Instant);
-
-impl Clocks {
-    /// From now on.
-    #[must_use]
-    pub(crate) fn begin() -> Self {
-        Self(Instant::now())
-    }
-
-    /// Now.
-    #[must_use]
-    pub(crate) fn now(&self) -> Moment {
-        let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        Moment { steady_ms: self.of(Instant::now()), wall_ms: milliseconds(wall) }
-    }
-
-    fn of(&self, at: Instant) -> i64 {
-        match at.checked_duration_since(self.0) {
-            Some(after) => milliseconds(after),
-            None => -milliseconds(self.0.duration_since(at)),
-        }
-    }
-}
-
-fn milliseconds(time: Duration) -> i64 {
-    i64::try_from(time.as_millis()).unwrap_or(i64::MAX)
-}
-
 /// Listens until it is dropped.
 pub(crate) struct Listening(#[expect(dead_code, reason = "its tasks end with it")] JoinSet<()>);
 
@@ -93,7 +65,9 @@ impl Listening {
     ) -> Self {
         let mut tasks = JoinSet::new();
         tasks.spawn(drives(plant.clone(), inbox.clone(), clocks));
-        tasks.spawn(stream(plant.clone(), inbox.clone(), clocks));
+        let wanted = Wanted::default();
+        tasks.spawn(stream(plant.clone(), inbox.clone(), clocks, wanted.clone()));
+        tasks.spawn(captured::follow(plant.clone(), inbox.clone(), clocks, wanted));
         tasks.spawn(lines(plant.clone(), inbox.clone(), clocks));
         tasks.spawn(pauses(inbox.clone(), clocks));
         tasks.spawn(tell(plant.clone(), health));
@@ -191,7 +165,7 @@ fn read(set: Set, snapshot: &Snapshot, numbers: &BTreeSet<u16>) -> Option<Readin
 }
 
 /// Keeps what the event stream tells.
-async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
+async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks, wanted: Wanted) {
     let (mut reader, is_gone) = plant.revisions().keeper();
     if is_gone {
         inbox.record(told_anew(clocks.now()));
@@ -211,8 +185,9 @@ async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
                     if record.line.is_none() {
                         record.line = drive.as_ref().map(|drive| drive.line().0.to_string());
                     }
-                    if frames::has_one(&record) {
-                        record.exchanges = record.line.as_ref().and_then(|line| exchanges(&plant, line));
+                    if let Some(line) = record.line.as_ref().filter(|_| frames::has_one(&record)) {
+                        wanted.note(line);
+                        record.exchanges = exchanges(&plant, line);
                     }
                     let kept = drive.filter(|_| record.what == "trip_explained").and_then(|drive| {
                         own_record(&drive.snapshot(), Record { body: None, ..record.clone() })

@@ -18,7 +18,7 @@ use rusqlite::{Connection, OptionalExtension as _, params};
 
 pub use self::{
     days::{Ran, days, ran},
-    frames::{Frame, frames},
+    frames::{AFTER_MS, BEFORE_MS, Frame, Heard, capture, frames},
     lines::{line_minutes, lines_at},
     parameters::parameters,
     readings::{Reading, readings},

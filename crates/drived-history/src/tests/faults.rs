@@ -359,7 +359,7 @@ async fn what_was_read_within_the_minute_is_there_for_whoever_asks() {
         inbox.show(shown.unwrap()).unwrap();
     }
     let limits = Limits::default();
-    let (clocks, done) = (crate::listen::Clocks::begin(), std::sync::Arc::default());
+    let (clocks, done) = (crate::clocks::Clocks::begin(), std::sync::Arc::default());
     let past = crate::past::InFile { path: path.clone(), limits, inbox: inbox.clone(), clocks, done };
     let asked = tokio::task::spawn_blocking(move || Past::story(&past, "pump", i64::MAX / 4));
     asked.await.unwrap().unwrap();
