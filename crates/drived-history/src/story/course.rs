@@ -8,7 +8,7 @@ use rusqlite::Connection;
 use super::{
     body::{Cause, body},
     facts::{Facts, lasting},
-    journal::{is_of_one_reading, is_to_fault, with_change},
+    journal::{is_of_one_reading, is_to_fault, is_told_by, with_change},
 };
 use crate::{read::parameters, store::StoreError};
 
@@ -52,6 +52,9 @@ pub(super) fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
         let is_shown = || trips.iter().any(|trip| is_of_one_reading(trip, found));
         !(explained.contains(&found.number) || is_to_fault(found) && is_shown())
     });
+    let steps: Vec<&RecordView> =
+        told.iter().copied().filter(|found| found.what == "clock_stepped").collect();
+    told.retain(|found| !steps.iter().any(|step| is_told_by(found, step)));
     // What several events show that came with one status is told with the first of them.
     let with_words = |place: usize, found: &RecordView| {
         let is_same =

@@ -10,6 +10,8 @@ use super::body::body;
 const EXPLAINED_WITHIN_MS: i64 = 30_000;
 /// An alarm comes within this time behind the event that it is of.
 const ALARM_WITHIN_MS: i64 = 5_000;
+/// The program and the history notice within this time of each other that the clock was set.
+const STEPPED_WITHIN_MS: i64 = 5_000;
 /// So many records of one reading stand between two of them at the most.
 const OF_ONE_READING: usize = 8;
 
@@ -80,6 +82,7 @@ pub fn lines(records: &[RecordView]) -> Vec<Line<'_>> {
         lines.push(Some(Line { record, text: record.text.clone(), is_alarm }));
     }
     fold_changes(&mut lines);
+    fold_steps(&mut lines);
     lines.into_iter().flatten().collect()
 }
 
@@ -102,6 +105,27 @@ fn fold_changes(lines: &mut [Option<Line<'_>>]) {
             lines[place] = None;
         }
     }
+}
+
+/// Tells once that the clock was set: as the history tells it, which knows from where to where.
+fn fold_steps(lines: &mut [Option<Line<'_>>]) {
+    let steps: Vec<&RecordView> =
+        lines.iter().flatten().map(|line| line.record).filter(|found| is_step(found, "history")).collect();
+    for line in lines {
+        line.take_if(|line| steps.iter().any(|step| is_told_by(line.record, step)));
+    }
+}
+
+fn is_step(found: &RecordView, kind: &str) -> bool {
+    found.kind == kind && found.what == "clock_stepped"
+}
+
+/// Whether the program's own notice that the clock was set is of this step, which the history tells.
+pub(super) fn is_told_by(notice: &RecordView, step: &RecordView) -> bool {
+    is_step(notice, "notice")
+        && is_step(step, "history")
+        && notice.run == step.run
+        && (notice.steady_ms - step.steady_ms).abs() <= STEPPED_WITHIN_MS
 }
 
 /// Whether a trip was read with the change of a state.
@@ -159,6 +183,18 @@ mod tests {
         all.drain(5..);
         let trip = "tripped: fault 9 (state changed: running to fault)".to_owned();
         assert_eq!(texts(&all), [(1_000, trip, true), own]);
+    }
+
+    #[test]
+    fn a_clock_that_was_set_is_told_once_and_as_the_history_tells_it() {
+        let at = |number, kind, at| RecordView {
+            drive: None,
+            alarm: false,
+            ..record(number, at, kind, "clock_stepped", &format!("the clock was set: {kind}"))
+        };
+        let all = [at(1, "notice", 1_000), at(2, "history", 1_400), at(3, "notice", 9_000)];
+        let told = ["the clock was set: history", "the clock was set: notice"];
+        assert_eq!(texts(&all).into_iter().map(|(_, text, _)| text).collect::<Vec<_>>(), told);
     }
 
     #[test]
