@@ -40,10 +40,12 @@
 //! # }
 //! ```
 
+mod last;
 mod pcapng;
 
 use std::{
     io::{self, Write},
+    sync::Arc,
     thread,
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
@@ -54,7 +56,11 @@ use tokio::{
     time::Instant,
 };
 
-pub use self::pcapng::{ReadError, Reader, Recording, Writer, read};
+pub(crate) use self::last::Last;
+pub use self::{
+    last::{Heard, LastFrames},
+    pcapng::{ReadError, Reader, Recording, Writer, read},
+};
 
 use crate::{config::LineConfig, protocol::Protocol};
 
@@ -126,7 +132,8 @@ impl Dissector {
 /// The end of a capture at the line's task.
 #[derive(Debug)]
 pub(crate) struct Tap {
-    frames: mpsc::Sender<Captured>,
+    frames: mpsc::Sender<Heard>,
+    last: Arc<Last>,
     began: (SystemTime, Instant),
     /// What came in since the last frame was complete, and when its last byte did.
     incoming: Option<(Instant, Vec<u8>)>,
@@ -155,10 +162,9 @@ impl Tap {
     fn push(&self, now: Instant, direction: Direction, bytes: Bytes) -> bool {
         let since = self.began.0.duration_since(UNIX_EPOCH).unwrap_or_default();
         let at = since + now.saturating_duration_since(self.began.1);
-        !matches!(
-            self.frames.try_send(Captured { at, direction, bytes }),
-            Err(mpsc::error::TrySendError::Closed(_))
-        )
+        // One that finds no room has its number all the same, by which it is missed.
+        let heard = Heard { number: self.last.count(), at: now, frame: Captured { at, direction, bytes } };
+        !matches!(self.frames.try_send(heard), Err(mpsc::error::TrySendError::Closed(_)))
     }
 }
 
@@ -176,22 +182,33 @@ impl Writing {
     }
 }
 
-/// A tap, and the thread that writes what it gives until the line is closed. It is a plain thread, because a paused
-/// clock stands still while one of tokio's blocking threads works.
-pub(crate) fn start(sink: impl Write + Send + 'static, dissector: Dissector) -> io::Result<(Tap, Writing)> {
+/// A tap, and the thread that writes what it gives, and keeps the last of it beside, until the line is closed. It is a plain
+/// thread, because a paused clock stands still while one of tokio's blocking threads works.
+pub(crate) fn start(
+    sink: impl Write + Send + 'static,
+    dissector: Dissector,
+    last: Arc<Last>,
+) -> io::Result<(Tap, Writing)> {
     let mut writer = Writer::new(sink, dissector)?;
-    let (frames, captured) = mpsc::channel::<Captured>(BACKLOG);
+    let (frames, captured) = mpsc::channel::<Heard>(BACKLOG);
     let (finished, writing) = oneshot::channel();
+    let kept = Arc::clone(&last);
     thread::Builder::new().name("capture".to_owned()).spawn(move || {
         // Whoever does not ask for the end of the capture does not want its error either.
-        let _ = finished.send(write_all(&mut writer, captured));
+        let _ = finished.send(write_all(&mut writer, captured, &kept));
     })?;
-    Ok((Tap { frames, began: (SystemTime::now(), Instant::now()), incoming: None }, Writing(writing)))
+    let began = (SystemTime::now(), Instant::now());
+    Ok((Tap { frames, last, began, incoming: None }, Writing(writing)))
 }
 
-fn write_all(writer: &mut Writer<impl Write>, mut captured: mpsc::Receiver<Captured>) -> io::Result<()> {
-    while let Some(frame) = captured.blocking_recv() {
-        writer.write(&frame)?;
+fn write_all(
+    writer: &mut Writer<impl Write>,
+    mut captured: mpsc::Receiver<Heard>,
+    last: &Last,
+) -> io::Result<()> {
+    while let Some(heard) = captured.blocking_recv() {
+        last.keep(heard.clone());
+        writer.write(&heard.frame)?;
         if captured.is_empty() {
             writer.flush()?;
         }

@@ -10,7 +10,7 @@ use tokio::{
 };
 
 use crate::{
-    capture::{self, Dissector, Writing},
+    capture::{self, Dissector, LastFrames, Writing},
     config::{LineConfig, SlaveSettings},
     evidence::{Fact, Finding},
     master::Master,
@@ -204,9 +204,22 @@ impl Line {
     /// The sink's, when it does not take the head of the file.
     pub fn capture(&self, sink: impl io::Write + Send + 'static) -> io::Result<Writing> {
         let dissector = Dissector::of(self.handle.shared.master().config());
-        let (tap, writing) = capture::start(sink, dissector)?;
+        let (tap, writing) = capture::start(sink, dissector, Arc::clone(&self.handle.shared.last))?;
         *self.handle.shared.tap() = Some(tap);
         Ok(writing)
+    }
+
+    /// What [captures](Self::capture) have heard on the line since a moment, as far as it is kept: the last 16 384 frames and 1 MiB of
+    /// them, also when the capture has ended. Nothing where none ran. It takes nothing from a capture, and the line does not wait
+    /// for it.
+    #[must_use]
+    pub fn last_frames(&self, since: Instant) -> LastFrames {
+        self.handle.shared.last.since(since)
+    }
+
+    /// Gives up what [is kept](Self::last_frames) of before a moment: some 100 bytes a frame.
+    pub fn forget_frames(&self, before: Instant) {
+        self.handle.shared.last.forget(before);
     }
 
     /// Closes the line: what waits ends with [`PortError::Closed`](drive_core::PortError::Closed), the exchange that is

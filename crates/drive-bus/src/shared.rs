@@ -11,7 +11,7 @@ use tokio::{
 };
 
 use crate::{
-    capture::Tap,
+    capture::{Last, Tap},
     master::{Master, Outcome},
 };
 
@@ -46,6 +46,8 @@ impl Drop for Handle {
 pub(crate) struct Shared {
     master: Mutex<Master<Caller>>,
     tap: Mutex<Option<Tap>>,
+    /// The last frames that captures have heard. The task never waits for it.
+    pub(crate) last: Arc<Last>,
     /// How often the task has come round.
     rounds: AtomicU64,
     /// Tells the task that the master has something new to do.
@@ -57,6 +59,7 @@ impl Shared {
         Self {
             master: Mutex::new(master),
             tap: Mutex::new(None),
+            last: Arc::default(),
             rounds: AtomicU64::new(0),
             wake: Notify::new(),
         }

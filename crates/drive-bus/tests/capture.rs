@@ -116,6 +116,40 @@ async fn a_capture_replayed_through_the_machines_gives_the_same_answers() {
     assert_eq!(replay(&frames, byte_by_byte), expected);
 }
 
+#[tokio::test(start_paused = true)]
+async fn what_a_capture_has_heard_last_is_kept_for_whoever_asks_later_and_without_one_nothing_is() {
+    let (line, mut peer) = line(|config| config);
+    let begin = Instant::now();
+    let ask = async |peer: &mut support::Peer| {
+        let mut slave = line.slave(3);
+        let call = tokio::spawn(async move { slave.call(Request::ReadHoldingRegisters(10, 1)).await });
+        peer.answer(&[3, 2, 0, 10]).await;
+        call.await.unwrap().unwrap().unwrap();
+    };
+    ask(&mut peer).await;
+    assert_eq!(line.last_frames(begin), capture::LastFrames::default());
+    let sink = Sink::default();
+    let writing = line.capture(sink.clone()).unwrap();
+    ask(&mut peer).await;
+    ask(&mut peer).await;
+    // Another one ends it, and takes what comes from then on.
+    let second = line.capture(std::io::sink()).unwrap();
+    writing.finished().await.unwrap();
+    ask(&mut peer).await;
+    line.close().await;
+    second.finished().await.unwrap();
+    let last = line.last_frames(begin);
+    let numbers: Vec<u64> = last.frames.iter().map(|heard| heard.number).collect();
+    assert_eq!((numbers, last.is_cut), ((0..6).collect(), false));
+    let frames = capture::read(&sink.0.lock().unwrap()).unwrap().frames;
+    let heard: Vec<Captured> = last.frames.iter().take(4).map(|heard| heard.frame.clone()).collect();
+    assert_eq!(heard, frames);
+    let later = last.frames[4].at;
+    assert_eq!(line.last_frames(later).frames, last.frames[4..]);
+    line.forget_frames(later);
+    assert_eq!(line.last_frames(begin).frames, last.frames[4..]);
+}
+
 /// Skipped, with a word about it, where tshark is not installed.
 #[tokio::test(start_paused = true)]
 async fn wireshark_decodes_a_capture_as_modbus_rtu_without_any_setting() {

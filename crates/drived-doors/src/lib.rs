@@ -22,6 +22,7 @@ mod gate;
 mod host;
 mod kept;
 mod network;
+pub mod outward;
 mod pace;
 mod patient;
 mod refusal;

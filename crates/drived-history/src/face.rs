@@ -15,9 +15,10 @@ use tokio::{
 };
 
 use crate::{
+    clocks::Clocks,
     config::{HistoryConfig, HistoryEntry},
     forward,
-    listen::{Clocks, Listening},
+    listen::Listening,
     maintenance,
     past::InFile,
     write::{

@@ -12,7 +12,9 @@
     reason = "a crate of the program: what is public is so for its other crates, who read its sources, and most names say it all"
 )]
 
+mod captured;
 mod chunk;
+mod clocks;
 pub mod column;
 pub mod config;
 pub mod curve;

@@ -1,27 +1,32 @@
 //! Listens to the plant: every drive's snapshots, the stream of what happens, and each line minute by minute. It takes what there is, and
 //! waits for nobody.
 
+mod said;
+
 use std::{
     collections::{BTreeMap, BTreeSet},
     fmt::Display,
     sync::Arc,
-    time::{Duration, SystemTime},
+    time::Duration,
 };
 
 use drive_fleet::{DriveHandle, Snapshot};
 use drived_face::Plant;
 use drived_plant::plant::{
     revisions::Next,
-    views::{CommandView, ExchangeView, NoticeView},
+    views::{ExchangeView, NoticeView},
 };
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use tokio::{
     sync::watch,
     task::{AbortHandle, JoinSet},
     time::{Instant, MissedTickBehavior, interval},
 };
 
+use self::said::{Alarms, said};
 use crate::{
+    captured::{self, Wanted},
+    clocks::{Clocks, milliseconds},
     departure::Departure,
     errors::Errors,
     gone::Gone,
@@ -44,40 +49,8 @@ const MINUTE: Duration = Duration::from_secs(60);
 const PULSE: Duration = Duration::from_millis(500);
 /// and what is no delay of a busy machine any more.
 const STOOD_STILL: Duration = Duration::from_secs(2);
-/// What is longer is kept without what the API told: a command for a thousand drives.
-const LONGEST_BODY: usize = 256 << 10;
 /// So many of the last exchanges of its line are kept beside a trip.
 const EXCHANGES: usize = 40;
-
-/// Both clocks of the daemon.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Clocks(Instant);
-
-impl Clocks {
-    /// From now on.
-    #[must_use]
-    pub(crate) fn begin() -> Self {
-        Self(Instant::now())
-    }
-
-    /// Now.
-    #[must_use]
-    pub(crate) fn now(&self) -> Moment {
-        let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        Moment { steady_ms: self.of(Instant::now()), wall_ms: milliseconds(wall) }
-    }
-
-    fn of(&self, at: Instant) -> i64 {
-        match at.checked_duration_since(self.0) {
-            Some(after) => milliseconds(after),
-            None => -milliseconds(self.0.duration_since(at)),
-        }
-    }
-}
-
-fn milliseconds(time: Duration) -> i64 {
-    i64::try_from(time.as_millis()).unwrap_or(i64::MAX)
-}
 
 /// Listens until it is dropped.
 pub(crate) struct Listening(#[expect(dead_code, reason = "its tasks end with it")] JoinSet<()>);
@@ -93,7 +66,9 @@ impl Listening {
     ) -> Self {
         let mut tasks = JoinSet::new();
         tasks.spawn(drives(plant.clone(), inbox.clone(), clocks));
-        tasks.spawn(stream(plant.clone(), inbox.clone(), clocks));
+        let wanted = Wanted::default();
+        tasks.spawn(stream(plant.clone(), inbox.clone(), clocks, wanted.clone()));
+        tasks.spawn(captured::follow(plant.clone(), inbox.clone(), clocks, wanted));
         tasks.spawn(lines(plant.clone(), inbox.clone(), clocks));
         tasks.spawn(pauses(inbox.clone(), clocks));
         tasks.spawn(tell(plant.clone(), health));
@@ -191,7 +166,7 @@ fn read(set: Set, snapshot: &Snapshot, numbers: &BTreeSet<u16>) -> Option<Readin
 }
 
 /// Keeps what the event stream tells.
-async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
+async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks, wanted: Wanted) {
     let (mut reader, is_gone) = plant.revisions().keeper();
     if is_gone {
         inbox.record(told_anew(clocks.now()));
@@ -211,8 +186,9 @@ async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks) {
                     if record.line.is_none() {
                         record.line = drive.as_ref().map(|drive| drive.line().0.to_string());
                     }
-                    if frames::has_one(&record) {
-                        record.exchanges = record.line.as_ref().and_then(|line| exchanges(&plant, line));
+                    if let Some(line) = record.line.as_ref().filter(|_| frames::has_one(&record)) {
+                        wanted.note(line);
+                        record.exchanges = exchanges(&plant, line);
                     }
                     let kept = drive.filter(|_| record.what == "trip_explained").and_then(|drive| {
                         own_record(&drive.snapshot(), Record { body: None, ..record.clone() })
@@ -252,120 +228,6 @@ fn own_record(snapshot: &Snapshot, of_trip: Record) -> Option<Record> {
     let text = format!("its own record of faults, in its own order: {}", kept.join("; "));
     let body = serde_json::to_string(&*faults).ok();
     Some(Record { what: "fault_record".to_owned(), is_alarm: false, text, body, ..of_trip })
-}
-
-/// An event as the stream tells it, as far as it is looked at here.
-#[derive(Deserialize)]
-struct Told {
-    time_unix_ms: i64,
-    event: String,
-    #[serde(default)]
-    drive: Option<String>,
-    alarm: bool,
-    text: String,
-}
-
-/// An alarm likewise.
-#[derive(Deserialize)]
-struct ToldAlarm {
-    id: u64,
-    count: u32,
-    state: String,
-    #[serde(default)]
-    drive: Option<String>,
-    #[serde(default)]
-    line: Option<String>,
-    text: String,
-}
-
-/// The alarms as they were kept last, by their numbers: one that stands for others is told anew with each of them.
-#[derive(Debug, Default)]
-struct Alarms(BTreeMap<u64, (String, u32, String)>);
-
-impl Alarms {
-    /// Whether it is another than it was.
-    fn is_new(&mut self, ToldAlarm { id, count, state, text, .. }: &ToldAlarm) -> bool {
-        let now = (state.clone(), *count, text.clone());
-        match state == "over" {
-            true => self.0.remove(id).is_some(),
-            false => self.0.insert(*id, now.clone()).is_none_or(|before| before != now),
-        }
-    }
-}
-
-/// What a frame of the event stream says, as a record; `None`: it is of a drive's or a line's values.
-fn said(frame: &str, now: Moment, alarms: &mut Alarms) -> Option<Record> {
-    let (head, data) = frame.split_once("\ndata: ")?;
-    let (_, name) = head.split_once("\nevent: ")?;
-    let data = data.trim_end();
-    let body = (data.len() <= LONGEST_BODY).then(|| data.to_owned());
-    let record = Record { body, ..Record::of_history(now, "", "") };
-    match name {
-        "event" => {
-            let told: Told = serde_json::from_str(data).ok()?;
-            let told = Told { text: lasting(told.text), ..told };
-            let at = Moment { wall_ms: told.time_unix_ms, ..now };
-            let kind = if told.drive.is_some() { Kind::Event } else { Kind::Notice };
-            let Told { event, drive, alarm, text, .. } = told;
-            Some(Record { at, kind, what: event, drive, is_alarm: alarm, text, ..record })
-        }
-        "alarm" => {
-            let told: ToldAlarm = serde_json::from_str(data).ok()?;
-            let told = ToldAlarm { text: lasting(told.text), ..told };
-            if !alarms.is_new(&told) {
-                return None;
-            }
-            let ToldAlarm { state, drive, line, text, .. } = told;
-            let is_alarm = state == "unacknowledged";
-            // An alarm keeps its words: its end is not told as if it came.
-            let text = if is_alarm { text } else { format!("{state}: {text}") };
-            Some(Record { kind: Kind::Alarm, what: state, drive, line, is_alarm, text, ..record })
-        }
-        "command" => {
-            let told: CommandView = serde_json::from_str(data).ok()?;
-            let at = Moment { wall_ms: i64::try_from(told.time_unix_ms).unwrap_or(i64::MAX), ..now };
-            Some(Record {
-                at,
-                kind: Kind::Command,
-                what: told.action.name().to_owned(),
-                drive: told.drive.clone(),
-                text: in_words(&told),
-                act: Some(format!("{}:{}", told.time_unix_ms, told.id)),
-                ..record
-            })
-        }
-        _ => None,
-    }
-}
-
-/// What is worth keeping of a text: not when a line asks a silent drive next, which is another time in each.
-fn lasting(mut text: String) -> String {
-    if let Some(at) = text.rfind(", next probe in ").filter(|at| !text[at + 1..].contains([',', ':'])) {
-        text.truncate(at);
-    }
-    text
-}
-
-/// A command in a sentence: what, by whom, from where, and what became of it.
-fn in_words(command: &CommandView) -> String {
-    let CommandView { caller, origin, outcome, .. } = command;
-    let several =
-        command.several.as_ref().map(|_| format!(" ({})", command.several_in_words())).unwrap_or_default();
-    // A command for one drive names it beside.
-    let of = match (&command.group, &command.several) {
-        (Some(group), _) => format!(" of group {group}"),
-        (None, Some(several)) if !command.selected.is_empty() => {
-            format!(" of {} drives that were selected", several.drives.len())
-        }
-        (None, Some(several)) => format!(" of all {} drives", several.drives.len()),
-        (None, None) => String::new(),
-    };
-    let why = command.text.as_ref().map(|text| format!(": {text}")).unwrap_or_default();
-    format!(
-        "{}{of} by {caller} from {origin}: {}{several}{why}",
-        command.command,
-        outcome.to_string().replace('_', " ")
-    )
 }
 
 /// Tells when this program itself stood still: nobody was asked and nothing was seen in that time, whatever was missed by it.
@@ -535,73 +397,5 @@ mod tests {
         assert_eq!(told.drive.as_deref(), Some("pump 1"));
         // In which unit it counts Inr says, which nobody has read here.
         assert_eq!(told.text, "parameter ACC written as 50 × Inr by anna from http 127.0.0.1");
-    }
-
-    #[test]
-    fn the_end_of_an_alarm_is_not_told_with_the_words_of_its_beginning() {
-        let now = Moment { steady_ms: 0, wall_ms: 0 };
-        let mut alarms = Alarms::default();
-        let mut told = |state: &str| {
-            let data = serde_json::json!({ "id": 7, "count": 1, "state": state, "line": "north", "text": "no drive answers" });
-            said(&format!("id: 1\nevent: alarm\ndata: {data}\n\n"), now, &mut alarms).unwrap().text
-        };
-        assert_eq!(told("unacknowledged"), "no drive answers");
-        assert_eq!(told("over"), "over: no drive answers");
-    }
-
-    #[test]
-    fn a_command_for_all_drives_is_told_as_one() {
-        let one = serde_json::json!({
-            "id": "a", "action": "stop", "command": "ramp stop", "caller": "anonymous", "origin": "http 127.0.0.1",
-            "outcome": "confirmed", "open": false, "time_unix_ms": 7, "drive": "pump 1",
-        });
-        let mut all = one.clone();
-        all.as_object_mut().unwrap().remove("drive");
-        for (name, count) in
-            [("confirmed", 1), ("pending", 0), ("not_reachable", 0), ("refused", 0), ("failed", 0)]
-        {
-            all[name] = count.into();
-        }
-        all["drives"] = serde_json::json!([one]);
-        let told = |data: &serde_json::Value| {
-            let frame = format!("id: 1\nevent: command\ndata: {data}\n\n");
-            said(&frame, Moment { steady_ms: 0, wall_ms: 0 }, &mut Alarms::default()).unwrap().text
-        };
-        assert!(told(&all).starts_with("ramp stop of all 1 drives by anonymous"), "{}", told(&all));
-        assert!(told(&one).starts_with("ramp stop by anonymous"), "{}", told(&one));
-    }
-
-    #[test]
-    fn an_alarm_whose_line_will_ask_its_drive_at_another_time_is_no_other_alarm() {
-        let now = Moment { steady_ms: 0, wall_ms: 0 };
-        let mut alarms = Alarms::default();
-        let mut told = |time: &str| {
-            let text = format!(
-                "lost while it was running, the motor may turn: the slave is off-line, next probe in {time}"
-            );
-            let data = serde_json::json!({ "id": 7, "count": 1, "state": "unacknowledged", "drive": "pump", "text": text });
-            said(&format!("id: 1\nevent: alarm\ndata: {data}\n\n"), now, &mut alarms)
-                .map(|record| record.text)
-        };
-        let text = "lost while it was running, the motor may turn: the slave is off-line";
-        assert_eq!(told("539.8ms").as_deref(), Some(text));
-        assert_eq!(told("1.2s"), None);
-    }
-
-    #[test]
-    fn an_alarm_that_is_told_again_for_those_that_follow_from_it_is_kept_once() {
-        let now = Moment { steady_ms: 0, wall_ms: 0 };
-        let mut alarms = Alarms::default();
-        let mut told = |state: &str, count: u32, members: u32| {
-            let data = serde_json::json!({
-                "id": 7, "count": count, "state": state, "line": "north", "text": "no drive answers", "members": members,
-            });
-            said(&format!("id: 1\nevent: alarm\ndata: {data}\n\n"), now, &mut alarms).is_some()
-        };
-        assert!(
-            told("unacknowledged", 1, 1) && !told("unacknowledged", 1, 2) && !told("unacknowledged", 1, 3)
-        );
-        assert!(told("acknowledged", 1, 3) && told("unacknowledged", 2, 3));
-        assert!(told("over", 2, 0) && told("unacknowledged", 1, 0), "it has come anew");
     }
 }

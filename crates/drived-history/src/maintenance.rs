@@ -9,7 +9,7 @@ use serde::Deserialize;
 use tokio::{sync::Notify, time::timeout};
 
 use crate::{
-    listen::Clocks,
+    clocks::Clocks,
     read::{Filter, History, Ran, bounds, ran, records},
     record::{Kind, Moment, Record},
     store::StoreError,

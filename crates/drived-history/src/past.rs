@@ -7,18 +7,18 @@ use std::{
 };
 
 use drived_plant::plant::past::{
-    AT_ONCE, CELLS, CurveView, CurvesAsked, DayView, DaysAsked, FrameCurveView, FrameView, GivenUp, KeptView,
-    LineMinutesView, MomentView, ParameterRead, Past, PastError, PastParameterView, RecordsAsked,
-    RecordsView, StepsView, StoryView, ValueNameView, ValuesAsked, ValuesView,
+    AT_ONCE, CELLS, CurveView, CurvesAsked, DayView, DaysAsked, FrameCaptureView, FrameCurveView, FrameView,
+    GivenUp, KeptView, LineMinutesView, MomentView, ParameterRead, Past, PastError, PastParameterView,
+    RecordsAsked, RecordsView, StepsView, StoryView, ValueNameView, ValuesAsked, ValuesView,
 };
 
 use tokio::sync::Notify;
 
 use crate::{
-    listen::Clocks,
+    clocks::Clocks,
     maintenance,
     quantity::{Quantity, TABLE},
-    read::{self, Filter, History},
+    read::{self, Filter, Heard, History},
     record::Setting,
     store::StoreError,
     story,
@@ -42,6 +42,13 @@ pub(crate) struct InFile {
 impl From<StoreError> for PastError {
     fn from(error: StoreError) -> Self {
         Self::Unreadable(error.to_string())
+    }
+}
+
+impl From<Heard> for FrameCaptureView {
+    fn from(Heard { frames, left_out, is_cut, from_unix_ms, to_unix_ms }: Heard) -> Self {
+        let [frames, left_out] = [frames, left_out].map(|count| u64::try_from(count).unwrap_or_default());
+        Self { from_unix_ms, to_unix_ms, frames, left_out, is_cut }
     }
 }
 
@@ -243,8 +250,15 @@ impl Past for InFile {
                 })
                 .collect(),
             exchanges: serde_json::from_str(&frame.exchanges).unwrap_or_default(),
+            capture: frame.capture.map(FrameCaptureView::from),
         });
         Ok(told.collect())
+    }
+
+    fn capture(&self, drive: &str, at_unix_ms: i64) -> Result<Vec<u8>, PastError> {
+        read::capture(&self.open()?.0, drive, at_unix_ms)?.ok_or_else(|| {
+            PastError::Asked(format!("no capture is kept of {drive:?} of {at_unix_ms}: its freeze-frames tell of which there is one"))
+        })
     }
 
     fn parameters(&self, drive: &str) -> Result<Vec<PastParameterView>, PastError> {

@@ -1,7 +1,8 @@
-//! What is kept in words: [`Record`], one for each thing that happened, and [`LineMinute`].
+//! What is kept in words: [`Record`], one for each thing that happened, [`LineMinute`] and [`LineFrames`].
 
 use std::sync::Arc;
 
+use drive_bus::capture::{Captured, Dissector};
 use drived_plant::plant::past::ParameterRead;
 
 /// When something happened, by both clocks.
@@ -99,6 +100,22 @@ pub struct LineMinute {
     /// Thousandths of the minute in which it was needed.
     pub busy_permille: u64,
     pub is_open: bool,
+}
+
+/// What a capture has heard of a line around something that has a freeze-frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LineFrames {
+    pub line: Arc<str>,
+    /// What the line speaks.
+    pub dissector: Dissector,
+    /// When the first and the last of them were heard, by the daemon's own clock.
+    pub first_ms: i64,
+    pub last_ms: i64,
+    pub frames: Vec<Captured>,
+    /// So many others there were between them, for which there was no room.
+    pub left_out: u64,
+    /// Whether there were others before them, for which there was no room.
+    pub is_cut: bool,
 }
 
 /// A setting of a drive that was read.

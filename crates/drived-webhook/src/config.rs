@@ -11,13 +11,13 @@ use drived_config::{
     config::{ConfigError, Entry as _, Parsed, Source, of, settings, within, words},
     host::host_name,
 };
+use drived_doors::outward::Target;
 use drived_words::duration::Time;
 use toml::Spanned;
 
 use crate::{
     message::{Body, Form},
     outbox::Wanted,
-    receiver::Target,
     sending::LONGEST_SETTLE,
     template::{Template, USUAL},
 };

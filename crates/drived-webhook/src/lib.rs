@@ -19,7 +19,6 @@ mod memory;
 mod message;
 mod outbox;
 mod post;
-mod receiver;
 mod sending;
 mod signature;
 mod template;

@@ -1,30 +1,21 @@
 //! One POST, within its time, whatever the other side does.
 
-use std::{pin::pin, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use bytes::Bytes;
+use drived_doors::outward::{self, AGENT, Answer, Target};
 use http_body_util::Full;
 use hyper::{
     Request, StatusCode,
-    client::conn::http1,
-    header::{AUTHORIZATION, CONTENT_TYPE, HOST, HeaderValue, RETRY_AFTER, USER_AGENT},
+    header::{AUTHORIZATION, CONTENT_TYPE, HOST, HeaderValue, USER_AGENT},
 };
-use hyper_util::rt::TokioIo;
-use tokio::{
-    io::{AsyncRead, AsyncWrite},
-    net::TcpStream,
-    time::timeout,
-};
+use tokio::{net::TcpStream, time::timeout};
 use tokio_rustls::{
     TlsConnector,
     rustls::{ClientConfig, pki_types::ServerName},
 };
 
-use crate::{counters::Why, receiver::Target, signature::Secret};
-
-/// The longest head of an answer; its body is not read.
-const LONGEST_HEAD: usize = 16 << 10;
-const AGENT: &str = concat!("drived/", env!("CARGO_PKG_VERSION"));
+use crate::{counters::Why, signature::Secret};
 
 /// Where and by which rights.
 #[derive(Clone)]
@@ -64,7 +55,7 @@ impl Way {
     pub(crate) async fn post(&self, id: &str, unix_s: u64, body: String) -> Result<(), NotTaken> {
         let request = self.request(id, unix_s, body)?;
         let status = timeout(self.within, self.exchange(request)).await;
-        let (status, after) =
+        let Answer { status, after } =
             status.map_err(|_| NotTaken::new(Why::Timeout, format!("no answer in {:?}", self.within)))??;
         match status {
             _ if status.is_success() => Ok(()),
@@ -103,41 +94,19 @@ impl Way {
         request.map_err(|error| NotTaken::new(Why::Refused, error.to_string()))
     }
 
-    async fn exchange(
-        &self,
-        request: Request<Full<Bytes>>,
-    ) -> Result<(StatusCode, Option<Duration>), NotTaken> {
+    async fn exchange(&self, request: Request<Full<Bytes>>) -> Result<Answer, NotTaken> {
         let Target { host, port, .. } = &self.target;
         let stream = TcpStream::connect((host.as_str(), *port)).await.map_err(NotTaken::unreachable)?;
-        match &self.tls {
-            None => over(stream, request).await,
+        let answer = match &self.tls {
+            None => outward::exchange(stream, request).await,
             Some(config) => {
                 let name = ServerName::try_from(host.clone()).map_err(NotTaken::unreachable)?;
                 let tls = TlsConnector::from(Arc::clone(config)).connect(name, stream).await;
-                over(tls.map_err(NotTaken::unreachable)?, request).await
+                outward::exchange(tls.map_err(NotTaken::unreachable)?, request).await
             }
-        }
+        };
+        answer.map_err(NotTaken::unreachable)
     }
-}
-
-/// Sends a request over a connection of its own, and gives what the head of the answer says.
-async fn over(
-    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
-    request: Request<Full<Bytes>>,
-) -> Result<(StatusCode, Option<Duration>), NotTaken> {
-    let mut builder = http1::Builder::new();
-    let shaken = builder.max_buf_size(LONGEST_HEAD).handshake(TokioIo::new(stream)).await;
-    let (mut sender, connection) = shaken.map_err(NotTaken::unreachable)?;
-    let mut answer = pin!(sender.send_request(request));
-    let answer = tokio::select! {
-        biased;
-        answer = &mut answer => answer,
-        // With the connection the answer is known: it came, or never will.
-        _ = connection => answer.await,
-    };
-    let answer = answer.map_err(NotTaken::unreachable)?;
-    let after = answer.headers().get(RETRY_AFTER).and_then(|after| after.to_str().ok()?.parse().ok());
-    Ok((answer.status(), after.map(Duration::from_secs)))
 }
 
 #[cfg(test)]

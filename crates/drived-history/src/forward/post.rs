@@ -1,23 +1,19 @@
 //! One POST, within its time, whatever the other side does.
 
-use std::{pin::pin, time::Duration};
+use std::time::Duration;
 
 use bytes::Bytes;
+use drived_doors::outward::{self, AGENT};
 use http_body_util::Full;
 use hyper::{
     Request, StatusCode,
-    client::conn::http1,
     header::{AUTHORIZATION, CONTENT_TYPE, HOST, USER_AGENT},
 };
-use hyper_util::rt::TokioIo;
 use tokio::{net::TcpStream, time::timeout};
 
 use super::Forward;
 
 const WITHIN: Duration = Duration::from_secs(20);
-/// The longest head of an answer; its body is not read.
-const LONGEST_HEAD: usize = 16 << 10;
-const AGENT: &str = concat!("drived/", env!("CARGO_PKG_VERSION"));
 
 /// Why it was not taken, or why nobody knows.
 #[derive(Debug, thiserror::Error)]
@@ -34,7 +30,7 @@ fn not_taken(error: impl std::fmt::Display) -> NotTaken {
 
 /// Posts lines. Done is what is answered by a 2xx.
 pub(super) async fn post(forward: &Forward, lines: String) -> Result<(), NotTaken> {
-    let target = &forward.target;
+    let target = &forward.target.0;
     let mut request = Request::post(&target.path)
         .header(HOST, &target.authority)
         .header(USER_AGENT, AGENT)
@@ -59,17 +55,7 @@ pub(super) async fn post(forward: &Forward, lines: String) -> Result<(), NotTake
 }
 
 async fn exchange(forward: &Forward, request: Request<Full<Bytes>>) -> Result<StatusCode, NotTaken> {
-    let address = (forward.target.host.as_str(), forward.target.port);
-    let stream = TcpStream::connect(address).await.map_err(not_taken)?;
-    let mut builder = http1::Builder::new();
-    let shaken = builder.max_buf_size(LONGEST_HEAD).handshake(TokioIo::new(stream)).await;
-    let (mut sender, connection) = shaken.map_err(not_taken)?;
-    let mut answer = pin!(sender.send_request(request));
-    let answer = tokio::select! {
-        biased;
-        answer = &mut answer => answer,
-        // With the connection the answer is known: it came, or never will.
-        _ = connection => answer.await,
-    };
-    Ok(answer.map_err(not_taken)?.status())
+    let target = &forward.target.0;
+    let stream = TcpStream::connect((target.host.as_str(), target.port)).await.map_err(not_taken)?;
+    Ok(outward::exchange(stream, request).await.map_err(not_taken)?.status)
 }

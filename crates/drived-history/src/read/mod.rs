@@ -7,6 +7,7 @@ mod days;
 mod frames;
 mod lines;
 mod parameters;
+mod readings;
 mod records;
 mod steps;
 mod then;
@@ -17,9 +18,10 @@ use rusqlite::{Connection, OptionalExtension as _, params};
 
 pub use self::{
     days::{Ran, days, ran},
-    frames::{Frame, frames},
+    frames::{AFTER_MS, BEFORE_MS, Frame, Heard, capture, frames},
     lines::{line_minutes, lines_at},
     parameters::parameters,
+    readings::{Reading, readings},
     records::{Filter, Found, records},
     steps::{DAY_MS, QUARTER_MS, pack_steps, steps, unpack_steps},
     then::then,

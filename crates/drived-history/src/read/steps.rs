@@ -90,6 +90,11 @@ pub fn steps(
             }
         }
     }
+    Ok(told(steps, quantity, length_ms))
+}
+
+/// Steps in the unit of their quantity.
+pub(super) fn told(steps: Steps, quantity: Quantity, length_ms: i64) -> Vec<StepView> {
     let told = |(start, step): (i64, Step)| StepView {
         start_unix_ms: start,
         least: quantity.value(step.least as f64),
@@ -97,7 +102,7 @@ pub fn steps(
         greatest: quantity.value(step.greatest as f64),
         known: (step.known_ms as f64 / length_ms as f64).min(1.0),
     };
-    Ok(steps.all.into_iter().map(told).collect())
+    steps.all.into_iter().map(told).collect()
 }
 
 /// The beginning of the hour from which on minutes of a quantity are kept.

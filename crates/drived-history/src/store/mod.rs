@@ -136,6 +136,9 @@ pub fn open_to_read(path: &Path) -> Result<Connection, StoreError> {
     if version < 4 {
         connection.execute_batch(schema::QUARTERS_OF_NONE)?;
     }
+    if version < 5 {
+        connection.execute_batch(schema::CAPTURES_OF_NONE)?;
+    }
     Ok(connection)
 }
 

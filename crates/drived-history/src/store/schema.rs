@@ -8,7 +8,7 @@ use crate::quantity::TABLE;
 pub const APPLICATION: i32 = 0x6472_7664;
 
 /// One step for each version: the tables of the first, and what each later one changed.
-const STEPS: &[&str] = &[FIRST, SECOND, THIRD, FOURTH];
+const STEPS: &[&str] = &[FIRST, SECOND, THIRD, FOURTH, FIFTH];
 
 pub(crate) const FIRST: &str = "
 CREATE TABLE run (
@@ -190,6 +190,29 @@ CREATE TABLE quarter (
 ) WITHOUT ROWID;
 ";
 
+/// What captures have heard around freeze-frames.
+const FIFTH: &str = "
+ALTER TABLE frame ADD COLUMN line TEXT;
+CREATE INDEX frame_on_line ON frame (line, run, steady_ms);
+CREATE TABLE captured (
+    id INTEGER PRIMARY KEY,
+    run INTEGER NOT NULL,
+    line TEXT NOT NULL,
+    first_ms INTEGER NOT NULL,
+    last_ms INTEGER NOT NULL,
+    frames INTEGER NOT NULL,
+    left_out INTEGER NOT NULL,
+    is_cut INTEGER NOT NULL,
+    data BLOB NOT NULL
+);
+CREATE INDEX captured_of ON captured (line, run, first_ms);
+";
+
+/// How a file of an older version is read as one of the fifth, by a reader who changes nothing in it.
+pub(crate) const CAPTURES_OF_NONE: &str = "
+CREATE TEMP VIEW frame AS SELECT *, NULL AS line FROM main.frame;
+CREATE TEMP TABLE captured (id INTEGER, run INTEGER, line TEXT, first_ms INTEGER, last_ms INTEGER, frames INTEGER,
+    left_out INTEGER, is_cut INTEGER, data BLOB)";
 /// How a file of an older version is read as one of the fourth, by a reader who changes nothing in it.
 pub(crate) const QUARTERS_OF_NONE: &str =
     "CREATE TEMP TABLE quarter (source INTEGER, quantity INTEGER, start_ms INTEGER, data BLOB)";

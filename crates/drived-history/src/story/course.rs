@@ -1,11 +1,14 @@
 //! What happened around a moment, in its order, and what of it nobody knows.
 
+use std::collections::BTreeSet;
+
 use drived_plant::plant::past::{Certainty, RecordView, SentenceView as Sentence};
 use rusqlite::Connection;
 
 use super::{
     body::{Cause, body},
     facts::{Facts, lasting},
+    journal::{is_of_one_reading, is_to_fault, is_told_by, with_change},
 };
 use crate::{read::parameters, store::StoreError};
 
@@ -40,7 +43,18 @@ pub(super) fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
         };
         is_near && is_meant
     };
-    let told: Vec<&RecordView> = facts.records.iter().filter(is_told).collect();
+    let mut told: Vec<&RecordView> = facts.records.iter().filter(is_told).collect();
+    // A trip is one fact: what it was by, and the state that it was shown with, are told with it.
+    let trips: Vec<&RecordView> = told.iter().copied().filter(|found| found.what == "tripped").collect();
+    let explained: BTreeSet<i64> =
+        trips.iter().filter_map(|trip| facts.explained(trip)).map(|explained| explained.number).collect();
+    told.retain(|found| {
+        let is_shown = || trips.iter().any(|trip| is_of_one_reading(trip, found));
+        !(explained.contains(&found.number) || is_to_fault(found) && is_shown())
+    });
+    let steps: Vec<&RecordView> =
+        told.iter().copied().filter(|found| found.what == "clock_stepped").collect();
+    told.retain(|found| !steps.iter().any(|step| is_told_by(found, step)));
     // What several events show that came with one status is told with the first of them.
     let with_words = |place: usize, found: &RecordView| {
         let is_same =
@@ -138,6 +152,10 @@ fn sentence(facts: &Facts, found: &RecordView, with_words: bool) -> Sentence {
     let asked = if found.kind == "command" { "asked: " } else { "" };
     let text = match found.text.strip_prefix("returned: ") {
         Some(alarm) if found.kind == "alarm" => format!("over: {alarm}"),
+        _ if found.what == "tripped" => {
+            let change = facts.records.iter().find(|one| is_to_fault(one) && is_of_one_reading(found, one));
+            with_change(facts.in_words(found), change)
+        }
         _ => facts.told(found),
     };
     // A line on which nothing is heard is opened anew: that its port was away nobody has seen.

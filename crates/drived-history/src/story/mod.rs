@@ -9,6 +9,7 @@ mod body;
 mod cause;
 mod course;
 mod facts;
+mod journal;
 #[cfg(test)]
 mod tests;
 mod values;
@@ -16,7 +17,6 @@ mod values;
 use drived_plant::plant::past::{RecordView, StoryView as Story};
 use rusqlite::Connection;
 
-pub use self::facts::AFTER_MS as LOOKED_AFTER_MS;
 use self::{
     about::{Asked, about, also, beside},
     before::before,
@@ -24,6 +24,10 @@ use self::{
     course::{AFTER_MS, BEFORE_MS, course, not_known, settings, with_settings},
     facts::Facts,
     values::moved,
+};
+pub use self::{
+    facts::AFTER_MS as LOOKED_AFTER_MS,
+    journal::{Line, lines},
 };
 use crate::store::StoreError;
 

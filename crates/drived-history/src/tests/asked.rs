@@ -9,7 +9,7 @@ use drived_plant::plant::past::{
 
 use super::{BEGIN_MS, Pump, event, moment};
 use crate::{
-    listen::Clocks,
+    clocks::Clocks,
     past::InFile,
     quantity::Quantity,
     record::{LineMinute, Record},

@@ -359,7 +359,7 @@ async fn what_was_read_within_the_minute_is_there_for_whoever_asks() {
         inbox.show(shown.unwrap()).unwrap();
     }
     let limits = Limits::default();
-    let (clocks, done) = (crate::listen::Clocks::begin(), std::sync::Arc::default());
+    let (clocks, done) = (crate::clocks::Clocks::begin(), std::sync::Arc::default());
     let past = crate::past::InFile { path: path.clone(), limits, inbox: inbox.clone(), clocks, done };
     let asked = tokio::task::spawn_blocking(move || Past::story(&past, "pump", i64::MAX / 4));
     asked.await.unwrap().unwrap();
@@ -381,11 +381,12 @@ async fn a_disk_that_does_not_answer_is_told_once_and_nothing_is_lost_that_there
     // As long as somebody else holds the file no write of it comes back.
     let other = Connection::open(&path).unwrap();
     other.execute_batch("BEGIN IMMEDIATE").unwrap();
-    for number in 1..=1_500 {
+    // Together no more than there is room for, however late the writer takes them.
+    for number in 1..=1_000 {
         inbox.record(event(moment(number), "pump", "tripped"));
     }
     becomes(&mut health, |health| matches!(health, Health::Failing(_))).await;
-    for number in 1_501..=3_000 {
+    for number in 1_001..=2_000 {
         inbox.record(event(moment(number), "pump", "tripped"));
     }
     other.execute_batch("ROLLBACK").unwrap();
@@ -393,7 +394,7 @@ async fn a_disk_that_does_not_answer_is_told_once_and_nothing_is_lost_that_there
     inbox.end();
     thread.join().unwrap();
     let told = words(&History::open(&path).unwrap().0);
-    assert_eq!(told.iter().filter(|what| *what == "tripped").count(), 3_000);
+    assert_eq!(told.iter().filter(|what| *what == "tripped").count(), 2_000);
     assert!(!told.contains(&"hole".to_owned()), "{told:?}");
 }
 

@@ -1,6 +1,8 @@
 //! Tests of the halves together, on files.
 
 mod asked;
+mod captures;
+mod clock;
 mod faults;
 mod week;
 

@@ -9,6 +9,7 @@ use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 
 use super::{
     age::{self, Lived},
+    captures::Kept,
     frames,
     inbox::{Batch, Lost, Shown},
 };
@@ -28,6 +29,8 @@ const FLUSHED_AT: usize = 100_000;
 const POINTS: usize = 250_000;
 /// So many records do.
 const RECORDS: usize = 8_192;
+/// So many bytes of what captures have heard do.
+const CAPTURES: usize = 4 << 20;
 /// A clock that has moved by less than this since was regulated, and no step is told.
 const STEP_MS: i64 = 1_000;
 /// By so much the wall's clock may drift away before times are counted by it anew.
@@ -66,6 +69,8 @@ pub struct Archive {
     records: VecDeque<Record>,
     lines: Vec<LineMinute>,
     settings: Vec<Setting>,
+    /// What captures have heard, packed.
+    captures: Vec<Kept>,
     sent: BTreeMap<String, Place>,
     /// For how long daemons had run with this file before this run began.
     lived_before_ms: i64,
@@ -87,6 +92,7 @@ impl Archive {
             records: VecDeque::new(),
             lines: Vec::new(),
             settings: Vec::new(),
+            captures: Vec::new(),
             sent: BTreeMap::new(),
             lived_before_ms: 0,
             flushed_at: now.steady_ms,
@@ -111,6 +117,14 @@ impl Archive {
         self.lines.truncate(RECORDS);
         self.settings.extend(batch.settings);
         self.settings.truncate(RECORDS);
+        for heard in batch.frames {
+            let kept = Kept::of(&heard);
+            let waiting: usize = self.captures.iter().map(Kept::bytes).sum();
+            match waiting + kept.bytes() <= CAPTURES {
+                true => self.captures.push(kept),
+                false => self.lose(Lost { records: 1, values: 0 }, now),
+            }
+        }
         self.sent.extend(batch.sent);
     }
 
@@ -293,6 +307,12 @@ impl Archive {
             self.settings.iter().try_for_each(|setting| keep_setting(&transaction, setting))?;
             transaction.commit()?;
             self.settings.clear();
+        }
+        if !self.captures.is_empty() {
+            let transaction = connection.transaction()?;
+            self.captures.iter().try_for_each(|kept| kept.write(&transaction, run))?;
+            transaction.commit()?;
+            self.captures.clear();
         }
         if !self.sent.is_empty() {
             let transaction = connection.transaction()?;

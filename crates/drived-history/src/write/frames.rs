@@ -4,15 +4,11 @@ use rusqlite::{Connection, Transaction, params};
 
 use crate::{
     column::{deflated, pack},
-    read,
+    read::{self, AFTER_MS, BEFORE_MS},
     record::{Kind, Record},
     store::StoreError,
 };
 
-/// From so long before,
-const BEFORE_MS: i64 = 60_000;
-/// to so long after.
-const AFTER_MS: i64 = 30_000;
 /// The events that have one.
 const EVENTS: [&str; 2] = ["tripped", "stop_unconfirmed"];
 
@@ -27,8 +23,8 @@ pub fn note(transaction: &Transaction<'_>, run: i64, record: &Record) -> rusqlit
     let Some(drive) = record.drive.as_ref().filter(|_| has_one(record)) else { return Ok(()) };
     let at = record.at.wall_ms;
     transaction.execute(
-        "INSERT INTO frame (drive, why, at_ms, start_ms, end_ms, is_whole, run, steady_ms, exchanges)
-         VALUES (?1, ?2, ?3, ?4, ?5, 0, ?6, ?7, ?8)",
+        "INSERT INTO frame (drive, why, at_ms, start_ms, end_ms, is_whole, run, steady_ms, exchanges, line)
+         VALUES (?1, ?2, ?3, ?4, ?5, 0, ?6, ?7, ?8, ?9)",
         params![
             drive,
             record.what,
@@ -38,6 +34,7 @@ pub fn note(transaction: &Transaction<'_>, run: i64, record: &Record) -> rusqlit
             run,
             record.at.steady_ms,
             record.exchanges.as_ref().map(|said| deflated(said.as_bytes())),
+            record.line,
         ],
     )?;
     Ok(())

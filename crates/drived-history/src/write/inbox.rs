@@ -8,7 +8,7 @@ use std::{
 
 use crate::{
     quantity::Set,
-    record::{LineMinute, Record, Setting},
+    record::{LineFrames, LineMinute, Record, Setting},
     store::Place,
     tracker::Seen,
 };
@@ -17,6 +17,9 @@ use crate::{
 const VALUES: usize = 16_384;
 /// Records that wait.
 const RECORDS: usize = 2_048;
+
+/// Frames of captures that wait.
+const FRAMES: usize = 65_536;
 
 /// What a drive has shown.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,6 +36,8 @@ pub struct Batch {
     pub records: Vec<Record>,
     pub lines: Vec<LineMinute>,
     pub settings: Vec<Setting>,
+    /// What captures have heard around what has a freeze-frame.
+    pub frames: Vec<LineFrames>,
     /// How far was sent on, by where to.
     pub sent: BTreeMap<String, Place>,
     pub lost: Lost,
@@ -109,6 +114,16 @@ impl Inbox {
         let mut waiting = self.lock();
         if waiting.lines.len() < RECORDS {
             waiting.lines.push(minute);
+        }
+    }
+
+    /// Takes what a capture has heard of a line.
+    pub fn frames(&self, heard: LineFrames) {
+        let mut waiting = self.lock();
+        let frames: usize = waiting.frames.iter().map(|heard| heard.frames.len()).sum();
+        match frames + heard.frames.len() <= FRAMES {
+            true => waiting.frames.push(heard),
+            false => waiting.lost.records += 1,
         }
     }
 

@@ -2,6 +2,7 @@
 
 pub mod age;
 pub mod archive;
+mod captures;
 mod changes;
 pub mod frames;
 pub mod inbox;

@@ -5,7 +5,7 @@ use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 use super::{
     Limits,
     age::{self, Lived},
-    changes, packs,
+    captures, changes, packs,
 };
 use crate::{
     chunk::{Chunk, Packed},
@@ -346,6 +346,7 @@ fn trim_frames(connection: &Connection, last: i64) -> Result<usize, StoreError> 
     let gone = trim_table(connection, "frame", last)?;
     if gone > 0 {
         connection.execute(NO_FRAME, [])?;
+        captures::trim(connection)?;
     }
     Ok(gone)
 }

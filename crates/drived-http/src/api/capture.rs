@@ -6,7 +6,7 @@ use axum::{
     body::{Body, Bytes},
     extract::{Query, State},
     http::{
-        StatusCode,
+        HeaderName, StatusCode,
         header::{CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_TYPE},
     },
     response::{IntoResponse, Response},
@@ -80,10 +80,14 @@ pub(super) async fn capture(
         let piece = timeout_at(until, read.recv()).await.ok().flatten()?;
         Some((Ok::<Bytes, Infallible>(piece), read))
     });
-    let headers = [
-        (CONTENT_TYPE, "application/x-pcapng"),
-        (CONTENT_DISPOSITION, "attachment; filename=\"line.pcapng\""),
-        (CACHE_CONTROL, "no-store"),
-    ];
-    Ok((headers, Body::from_stream(body)).into_response())
+    Ok((heads("line.pcapng"), Body::from_stream(body)).into_response())
+}
+
+/// What a browser is told of a capture: to keep it as a file of this name.
+pub(super) fn heads(name: &str) -> [(HeaderName, String); 3] {
+    [
+        (CONTENT_TYPE, "application/x-pcapng".to_owned()),
+        (CONTENT_DISPOSITION, format!("attachment; filename=\"{name}\"")),
+        (CACHE_CONTROL, "no-store".to_owned()),
+    ]
 }

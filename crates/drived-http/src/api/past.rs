@@ -5,13 +5,14 @@ use std::sync::Arc;
 use axum::{
     extract::{Query, State, rejection::QueryRejection},
     http::StatusCode,
-    response::Response,
+    response::{IntoResponse as _, Response},
 };
 use serde::{Deserialize, Serialize};
 use tokio::{sync::Semaphore, task::spawn_blocking};
 
 use super::{
     ask::{Named, Viewer},
+    capture,
     problem::Problem,
     read::fresh,
 };
@@ -152,6 +153,18 @@ pub(super) async fn frames(
     told(&plant, move |past, _| past.frames(&drive, from_unix_ms, to_unix_ms)).await
 }
 
+pub(super) async fn capture_of_frame(
+    State(plant): State<Plant>,
+    _: Viewer,
+    Named(drive): Named,
+    query: Result<Query<At>, QueryRejection>,
+) -> Result<Response, Problem> {
+    let Query(At { at_unix_ms }) = query?;
+    are_moments([at_unix_ms])?;
+    let ask = move |past: &dyn Past, _: &GivenUp| past.capture(&drive, at_unix_ms);
+    told_as(&plant, ask, |file| (capture::heads("trip.pcapng"), file).into_response()).await
+}
+
 pub(super) async fn parameters(
     State(plant): State<Plant>,
     _: Viewer,
@@ -205,9 +218,18 @@ fn are_moments<const N: usize>(all: [i64; N]) -> Result<(), Problem> {
 }
 
 /// Asks whoever keeps the past, on a thread that may wait for a disk.
-async fn told<T: Serialize + Send + 'static>(
+async fn told<T: Serialize + 'static>(
     plant: &Plant,
     ask: impl FnOnce(&dyn Past, &GivenUp) -> Result<T, PastError> + Send + 'static,
+) -> Result<Response, Problem> {
+    told_as(plant, ask, |view| fresh(&view)).await
+}
+
+/// The same in a form of its own.
+async fn told_as<T: 'static>(
+    plant: &Plant,
+    ask: impl FnOnce(&dyn Past, &GivenUp) -> Result<T, PastError> + Send + 'static,
+    form: impl FnOnce(T) -> Response + Send + 'static,
 ) -> Result<Response, Problem> {
     let past: Arc<dyn Past> =
         plant.past().ok_or_else(|| Problem::not_found("no history is kept by this program"))?;
@@ -218,7 +240,7 @@ async fn told<T: Serialize + Send + 'static>(
     let given_up = waits.0.clone();
     let answer = spawn_blocking(move || {
         let _place = place;
-        ask(&*past, &given_up).map(|view| fresh(&view))
+        ask(&*past, &given_up).map(form)
     });
     match answer.await.map_err(|error| unreadable(error.to_string()))? {
         Ok(answer) => Ok(answer),

@@ -79,6 +79,8 @@ const WAIT: Parameter = Parameter {
     about: "how long the outcome is waited for: 0 to 30s, 2s unless it is said",
     kind: "string",
 };
+const PCAPNG: Answer =
+    Answer { status: 200, about: "a pcapng file", content: "application/x-pcapng", describe: None };
 const SECONDS: Parameter =
     Parameter { name: "seconds", about: "how long: 1 to 600, 10 unless it is said", kind: "integer" };
 const DRY_RUN: Parameter =
@@ -360,6 +362,15 @@ fn pasts() -> Vec<Route> {
         ),
         of_past(
             Route::get(
+                "/api/v1/drives/{name}/frames/capture",
+                past::capture_of_frame,
+                "What captures have heard of its line around a freeze-frame",
+            )
+            .with_query(parameter("at_unix_ms", "the at_unix_ms of the freeze-frame", "integer"))
+            .answer(PCAPNG),
+        ),
+        of_past(
+            Route::get(
                 "/api/v1/drives/{name}/parameters/past",
                 past::parameters,
                 "Every value of the settings of a drive that was ever read",
@@ -457,12 +468,7 @@ fn reads() -> Vec<Route> {
         .or_problem(504),
         Route::get("/api/v1/lines/{name}/capture", capture::capture, "What is on the line from now on")
             .with_query(SECONDS)
-            .answer(Answer {
-                status: 200,
-                about: "a pcapng file",
-                content: "application/x-pcapng",
-                describe: None,
-            })
+            .answer(PCAPNG)
             .or_problem(503),
         Route::get("/api/v1/lines", read::lines, "All lines").answers::<Vec<LineView>>(200, "the lines"),
         Route::get(

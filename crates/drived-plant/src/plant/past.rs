@@ -63,6 +63,12 @@ pub trait Past: Send + Sync {
     /// [`PastError`]: nothing can be answered.
     fn frames(&self, drive: &str, from_unix_ms: i64, to_unix_ms: i64) -> Result<Vec<FrameView>, PastError>;
 
+    /// What captures have heard of the line of a drive around the freeze-frame of this moment, as pcapng.
+    ///
+    /// # Errors
+    /// [`PastError`]: there is none, or nothing can be answered.
+    fn capture(&self, drive: &str, at_unix_ms: i64) -> Result<Vec<u8>, PastError>;
+
     /// Every value of its parameters that was ever read, by address, the newest last.
     ///
     /// # Errors
@@ -326,6 +332,22 @@ pub struct FrameView {
     /// The last exchanges of its line before it was told, where they were kept: the newest last.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub exchanges: Vec<super::views::ExchangeView>,
+    /// What captures of its line have heard around it; absent where none ran.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub capture: Option<FrameCaptureView>,
+}
+
+/// How much captures have heard of the line of a drive around a freeze-frame. The frames themselves are told as a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct FrameCaptureView {
+    /// When the first and the last of them were heard.
+    pub from_unix_ms: i64,
+    pub to_unix_ms: i64,
+    pub frames: u64,
+    /// So many others there were between them, for which there was no room.
+    pub left_out: u64,
+    /// Whether there were others before them, for which there was no room.
+    pub is_cut: bool,
 }
 
 /// A value in a freeze-frame, as it was read.

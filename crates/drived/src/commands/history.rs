@@ -1,26 +1,33 @@
 //! `drived history`: what a drive did between two moments, read from the black box, beside a running daemon or without one.
 
+mod frames;
+mod place;
+mod times;
+
 use std::path::PathBuf;
 
-use chrono::{DateTime, Local};
-use drived_client::{ANSWERED_WITHIN, Daemon, path_of};
-use drived_file::Config;
+use chrono::Local;
 use drived_history::{
     column::Point,
-    config::HistoryConfig,
+    curve::Piece,
     quantity::{Quantity, TABLE},
-    read::{self, Filter, History},
+    read::{self, Filter, Found, History, Reading},
     store::StoreError,
+    story::{self, Line},
 };
 use drived_plant::plant::past::{AT_ONCE, RecordView, StepView as Told};
 use drived_words::{
     duration::Time,
     failure::Failure,
-    moment,
     output::{self, JsonArgs, Table},
 };
 use serde_json::json;
 
+use self::times::{offsets, whole};
+pub(crate) use self::{
+    place::{HistoryArgs, failed},
+    times::{moment_of, offset, said},
+};
 use super::plot;
 
 /// Show what a drive did, and what happened to it, between two moments
@@ -54,70 +61,13 @@ pub(crate) struct Args {
     /// Draw the values as curves, a gap where nothing is known
     #[arg(long, conflicts_with_all = ["csv", "json"])]
     plot: bool,
+    /// Write what a capture has heard of its line around the one trip of that time to this file, for Wireshark and `drived explain`
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["csv", "json", "plot", "values", "every"])]
+    frames_to: Option<PathBuf>,
     #[command(flatten)]
     place: HistoryArgs,
     #[command(flatten)]
     json: JsonArgs,
-}
-
-/// Where the history is.
-#[derive(Debug, clap::Args)]
-pub(crate) struct HistoryArgs {
-    /// The configuration, whose state folder keeps the history
-    #[arg(long, value_name = "FILE", default_value = "drives.toml")]
-    config: PathBuf,
-    /// The file of the history itself, wherever it is
-    #[arg(long, value_name = "FILE", conflicts_with = "config")]
-    file: Option<PathBuf>,
-}
-
-impl HistoryArgs {
-    /// Opens it, where it has something of this drive.
-    pub(crate) fn open(&self, drive: &str) -> Result<History, Failure> {
-        let history = History::open(&self.path()?).map_err(failed)?;
-        let known = read::drives(&history.0).map_err(failed)?;
-        match known.iter().any(|name| name == drive) {
-            true => Ok(history),
-            false => {
-                let known = if known.is_empty() { "none yet".to_owned() } else { known.join(", ") };
-                Err(Failure::Input(format!("the history has nothing of a drive {drive:?}: it has {known}")))
-            }
-        }
-    }
-
-    /// Has a daemon that keeps it write what it has read within the last minute, by asking it for the same story; without one the file is
-    /// told as it is, and so it is where that has another drive of this name.
-    pub(crate) async fn have_written(&self, drive: &str, at: i64) -> Result<(), Failure> {
-        if self.file.is_some() {
-            return Ok(());
-        }
-        let config = Config::load(&self.config).map_err(|error| Failure::Input(error.to_string()))?;
-        let Some(socket) = config.doors.socket else { return Ok(()) };
-        let asked = async {
-            let mut daemon = Daemon::connect(socket.path.as_deref(), None).await?;
-            let path = format!("{}?at_unix_ms={at}", path_of(&["drives", drive, "why"]));
-            daemon.get(&path).await
-        };
-        // Whatever it answers, or that it does not.
-        let _ = tokio::time::timeout(ANSWERED_WITHIN, asked).await;
-        Ok(())
-    }
-
-    fn path(&self) -> Result<PathBuf, Failure> {
-        if let Some(file) = &self.file {
-            return Ok(file.clone());
-        }
-        let config = Config::load(&self.config).map_err(|error| Failure::Input(error.to_string()))?;
-        let face = config.face("history").and_then(drived_history::config_of);
-        let file = face.and_then(|HistoryConfig { file, .. }| file.clone());
-        file.ok_or_else(|| {
-            Failure::Input(format!("{}: no history is kept by this configuration", self.config.display()))
-        })
-    }
-}
-
-pub(crate) fn failed(error: StoreError) -> Failure {
-    Failure::Input(error.to_string())
 }
 
 /// Why points are read no further.
@@ -130,46 +80,6 @@ impl From<StoreError> for Stopped {
     fn from(error: StoreError) -> Self {
         Self::Unreadable(error)
     }
-}
-
-/// A moment that somebody has said, in milliseconds since 1970; an hour that comes twice is told.
-pub(crate) fn moment_of(text: &str) -> Result<i64, Failure> {
-    let now = Local::now();
-    let said = moment::said(text, &now).map_err(|error| Failure::Input(error.to_string()))?;
-    let is_time_alone = text.trim().chars().all(|one| one.is_ascii_digit() || matches!(one, ':' | '.'));
-    if is_time_alone && day(&said.at) != day(&now) {
-        output::complain(format_args!(
-            "{text} is still to come today: yesterday, {}, is meant",
-            day(&said.at)
-        ));
-    }
-    if let Some(again) = said.again {
-        output::complain(format_args!(
-            "{text} was twice: {} is meant; for the second write {}",
-            said.at.to_rfc3339(),
-            again.to_rfc3339()
-        ));
-    }
-    Ok(said.at.timestamp_millis())
-}
-
-/// A moment as a person reads it, with the zone's offset.
-pub(crate) fn said(unix_ms: i64) -> String {
-    local(unix_ms)
-        .map_or_else(|| unix_ms.to_string(), |time| time.format("%Y-%m-%d %H:%M:%S%.3f").to_string())
-}
-
-/// The day of a moment.
-fn day(at: &DateTime<Local>) -> String {
-    at.format("%Y-%m-%d").to_string()
-}
-
-pub(crate) fn offset(unix_ms: i64) -> String {
-    local(unix_ms).map(|time| format!("UTC{}", time.format("%:z"))).unwrap_or_default()
-}
-
-fn local(unix_ms: i64) -> Option<DateTime<Local>> {
-    DateTime::from_timestamp_millis(unix_ms).map(|time| time.with_timezone(&Local))
 }
 
 /// What is shown to a person who has not said which values.
@@ -190,24 +100,46 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
         (None, None) => now,
     };
-    if to < from {
+    let quantities = args.values.iter().map(|name| named(name)).collect::<Result<Vec<_>, _>>()?;
+    let history = args.place.open(&args.name)?;
+    if args.csv {
+        csv_head(args.every.is_some())?;
+    }
+    let readings = readings(&history, from, to)?;
+    if let Some(file) = &args.frames_to {
+        return frames::write(&history, &args.name, &readings, file);
+    }
+    for reading in readings {
+        let asked =
+            Asked { drive: &args.name, from: reading.from_ms, to: reading.to_ms, reading, history: &history };
+        match (args.csv, args.json.is_json(), args.plot) {
+            (true, ..) => asked.csv(&quantities, args.every)?,
+            (_, true, _) => asked.json(&quantities, args.every)?,
+            (_, _, true) => asked.plot(&quantities, args.every)?,
+            _ => asked.show(&quantities, args.every)?,
+        }
+    }
+    Ok(())
+}
+
+/// The parts of a time in which the clock went on: one, unless it was set back in it. That is told apart from what a program reads.
+fn readings(history: &History, from: i64, to: i64) -> Result<Vec<Reading>, Failure> {
+    let readings = read::readings(&history.0, from, to).map_err(failed)?;
+    if readings.is_empty() {
         return Err(Failure::Input(format!(
-            "{} is before {}: expected a time that ends after it begins",
+            "{} is before {}, and the clock was not set back between them: expected a time that ends after it begins",
             said(to),
             said(from)
         )));
     }
-    let quantities = args.values.iter().map(|name| named(name)).collect::<Result<Vec<_>, _>>()?;
-    let history = args.place.open(&args.name)?;
-    let asked = Asked { drive: &args.name, from, to, history: &history };
-    if args.plot {
-        return asked.plot(&quantities, args.every);
+    for (before, after) in readings.iter().rev().skip(1).rev().filter_map(|reading| reading.set_behind) {
+        output::complain(format_args!(
+            "the clock was set back within that time, from {} to {}: what was before that is told first",
+            said(before),
+            said(after)
+        ));
     }
-    match (args.csv, args.json.is_json()) {
-        (true, _) => asked.csv(&quantities, args.every),
-        (_, true) => asked.json(&quantities, args.every),
-        _ => asked.show(&quantities, args.every),
-    }
+    Ok(readings)
 }
 
 fn named(name: &str) -> Result<Quantity, Failure> {
@@ -221,6 +153,8 @@ struct Asked<'a> {
     drive: &'a str,
     from: i64,
     to: i64,
+    /// Of which reading of the clock they are.
+    reading: Reading,
     history: &'a History,
 }
 
@@ -230,6 +164,10 @@ impl Asked<'_> {
         quantity: Quantity,
         mut each: impl FnMut(Point) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
+        if !self.reading.is_the_only_one() {
+            let pieces = self.reading.pieces(&self.history.0, self.drive, quantity).map_err(failed)?;
+            return pieces.into_iter().flat_map(Piece::closed).try_for_each(each);
+        }
         let each = |point| each(point).map(|()| true).map_err(Stopped::By);
         let read = read::points(&self.history.0, self.drive, quantity, self.from, self.to, each);
         read.map_err(|stopped| match stopped {
@@ -244,8 +182,27 @@ impl Asked<'_> {
                 "expected longer steps than {length_ms} ms: {STEPS} are told at the most"
             )));
         }
+        if !self.reading.is_the_only_one() {
+            let steps =
+                self.reading.steps(&self.history.0, self.drive, quantity, length_ms).map_err(failed)?;
+            if !steps.is_empty() {
+                return Ok(steps);
+            }
+            // What is kept in steps alone has both readings in them.
+        }
         read::steps(&self.history.0, self.drive, quantity, self.from, self.to, length_ms, &|| true)
             .map_err(failed)
+    }
+
+    fn say_head(&self) -> Result<(), Failure> {
+        let Self { drive, from, to, reading, .. } = *self;
+        let before =
+            reading.set_behind.map(|(_, to)| format!(", before the clock was set back to {}", said(to)));
+        let after =
+            reading.set_before.map(|(from, _)| format!(", after the clock was set back from {}", said(from)));
+        let (after, before) = (after.unwrap_or_default(), before.unwrap_or_default());
+        let offsets = offsets(from, to);
+        output::say(format_args!("{drive}, {} to {} ({offsets}){after}{before}", said(from), said(to)))
     }
 
     /// Those that are meant, or all of which there is something.
@@ -257,7 +214,10 @@ impl Asked<'_> {
     }
 
     /// All that happened, some at a time.
-    fn each_record(&self, mut each: impl FnMut(&RecordView) -> Result<(), Failure>) -> Result<(), Failure> {
+    fn each_records(
+        &self,
+        mut each: impl FnMut(&[RecordView]) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         let mut after = 0;
         loop {
             let filter = Filter {
@@ -268,20 +228,22 @@ impl Asked<'_> {
                 after,
                 ..Filter::default()
             };
-            let found = read::records(&self.history.0, &filter).map_err(failed)?;
-            found.records.iter().try_for_each(&mut each)?;
-            match found.records.last() {
-                Some(last) if found.is_cut => after = last.number,
+            let Found { mut records, is_cut } = read::records(&self.history.0, &filter).map_err(failed)?;
+            let last = records.last().map(|last| last.number);
+            records.retain(|found| self.reading.has(found.run, found.steady_ms));
+            each(&records)?;
+            match last {
+                Some(last) if is_cut => after = last,
                 _ => return Ok(()),
             }
         }
     }
 
+    fn frames(&self) -> Result<Vec<read::Frame>, Failure> {
+        frames::of(self.history, self.drive, &self.reading)
+    }
+
     fn csv(&self, quantities: &[Quantity], every: Option<Time>) -> Result<(), Failure> {
-        match every {
-            None => output::say_as_it_is("time,time_unix_ms,value,is")?,
-            Some(_) => output::say_as_it_is("time,time_unix_ms,value,least,mean,greatest,known")?,
-        }
         for quantity in self.meant(quantities)? {
             match every {
                 None => self.each_point(quantity, |point| {
@@ -317,12 +279,13 @@ impl Asked<'_> {
                 }
             }
         }
-        self.each_record(|found| output::say_as_it_is(json!(found)))
+        self.each_records(|all| all.iter().try_for_each(|found| output::say_as_it_is(json!(found))))?;
+        self.frames()?.iter().try_for_each(|frame| output::say_as_it_is(frames::as_json(frame)))
     }
 
     fn plot(&self, quantities: &[Quantity], every: Option<Time>) -> Result<(), Failure> {
         let (from, to) = (self.from, self.to);
-        output::say(format_args!("{}, {} to {} ({})", self.drive, said(from), said(to), offsets(from, to)))?;
+        self.say_head()?;
         if let Some(word) = quantities.iter().find(|quantity| !quantity.is_number()) {
             let text = format!("{word} is no number: without --plot it is told as it changes");
             return Err(Failure::Input(text));
@@ -358,7 +321,7 @@ impl Asked<'_> {
 
     fn show(&self, quantities: &[Quantity], every: Option<Time>) -> Result<(), Failure> {
         let (from, to) = (self.from, self.to);
-        output::say(format_args!("{}, {} to {} ({})", self.drive, said(from), said(to), offsets(from, to)))?;
+        self.say_head()?;
         let quantities = if quantities.is_empty() { SHOWN.to_vec() } else { quantities.to_vec() };
         let length = every.map_or_else(|| step(to - from), length);
         let mut rows: std::collections::BTreeMap<i64, Vec<Option<Told>>> = std::collections::BTreeMap::new();
@@ -383,35 +346,28 @@ impl Asked<'_> {
             output::say_table(table)?;
         }
         let (mut table, mut any) = (Table::new(["time", "what", ""]), false);
-        self.each_record(|found| {
-            any = true;
-            let alarm = if found.alarm { "ALARM" } else { "" };
-            table.row([
-                said(found.time_unix_ms),
-                format!("{}: {}", found.kind, found.text),
-                alarm.to_owned(),
-            ]);
+        self.each_records(|all| {
+            for Line { record, text, is_alarm } in story::lines(all) {
+                any = true;
+                let alarm = if is_alarm { "ALARM" } else { "" };
+                let text = format!("{}: {text}", record.kind);
+                table.row([said(record.time_unix_ms), text, alarm.to_owned()]);
+            }
             Ok(())
         })?;
         if !any {
             return output::say("nothing is recorded of that time");
         }
-        output::say_table(table)
+        output::say_table(table)?;
+        self.frames()?.iter().try_for_each(|frame| output::say(frames::in_words(frame)))
     }
 }
 
-/// The offsets of the zone at both ends, where they differ.
-fn offsets(from: i64, to: i64) -> String {
-    let (first, last) = (offset(from), offset(to));
-    if first == last { first } else { format!("{first}, then {last}: the clocks were changed between") }
-}
-
-/// A moment that no zone changes.
-fn whole(unix_ms: i64) -> String {
-    local(unix_ms).map_or_else(
-        || unix_ms.to_string(),
-        |time| time.to_rfc3339_opts(chrono::SecondsFormat::Millis, false),
-    )
+fn csv_head(is_in_steps: bool) -> Result<(), Failure> {
+    match is_in_steps {
+        false => output::say_as_it_is("time,time_unix_ms,value,is"),
+        true => output::say_as_it_is("time,time_unix_ms,value,least,mean,greatest,known"),
+    }
 }
 
 fn in_words(quantity: Quantity, told: Option<&Told>) -> String {

@@ -34,7 +34,9 @@
 //!
 //! Where a row's evidence is not there, its cause is not told, or told as what is not known.
 
+mod asked;
 mod back;
+mod change;
 mod drive;
 mod evidence;
 mod own;
@@ -48,7 +50,9 @@ use drived_plant::plant::past::{
 };
 
 use self::{
-    drive::{at_the_drive, of_change, of_command, of_departure, of_unconfirmed_stop, silent_with},
+    asked::{of_command, of_unconfirmed_stop},
+    change::of_change,
+    drive::{at_the_drive, of_departure, silent_with},
     evidence::{BESIDE_MS, SILENT_MS, TOGETHER_MS, lost_for},
     own::{is_block_of_supply, of_blocked_by_supply, of_run_before_kill},
     silence::of_loss,

@@ -3,7 +3,10 @@
 use drived_plant::plant::past::RecordView;
 
 use super::{
-    super::body::{Body, Cause, OfOne, OfSeveral, body},
+    super::{
+        body::{Body, Cause, OfOne, OfSeveral, body},
+        journal::as_trip,
+    },
     Facts, SEEN_AGAIN_MS,
 };
 
@@ -112,8 +115,7 @@ impl Facts {
 
     /// An event in words, a trip with what the drive said of it.
     pub(in crate::story) fn in_words(&self, found: &RecordView) -> String {
-        let explained =
-            self.explained(found).map(|explained| explained.text.replacen("trip explained", "tripped", 1));
+        let explained = self.explained(found).map(as_trip);
         explained.unwrap_or_else(|| self.told(found))
     }
 

@@ -31,7 +31,8 @@ use tokio::{
 
 use super::{Story, tell};
 use crate::{
-    listen::{Clocks, Listening},
+    clocks::Clocks,
+    listen::Listening,
     quantity::{Quantity, Set},
     record::{Kind, Moment, Record},
     store,

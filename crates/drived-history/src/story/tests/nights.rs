@@ -23,6 +23,12 @@ async fn a_trip_is_told_by_what_the_drive_says_and_what_brought_it_there_is_left
     assert_eq!(story.why(Certainty::Likely), "", "nothing else was tripped");
     let neighbour = tell_nothing_of(&story, "pump 2");
     assert!(neighbour, "the other pump ran on: {story:?}");
+    let of_trip: Vec<&str> =
+        story.course.iter().map(|told| &*told.text).filter(|told| told.contains("tripped")).collect();
+    let [trip, withdrawal] = &of_trip[..] else { panic!("each fact is told once: {of_trip:?}") };
+    let told = "tripped: 18 ObF: DC bus overvoltage (state changed: running to fault) [ETA 0627h to 0208h";
+    assert!(trip.starts_with(told) && withdrawal.starts_with("command: withdrawal"), "{of_trip:?}");
+    assert!(!story.course().contains("trip explained"), "{story:?}");
     assert_eq!(story.about.unwrap().text, "tripped: 18 ObF: DC bus overvoltage");
 }
 

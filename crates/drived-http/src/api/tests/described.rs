@@ -66,8 +66,9 @@ async fn every_answer_and_every_refusal_is_as_the_document_says() {
                 // All of them take a while, and their shape is seen in a few.
                 let asked = if path.ends_with("/parameters") { format!("{asked}?wait=500ms") } else { asked };
                 // No history is kept of this plant, and that is answered.
-                let is_past = ["/past", "/why", "/frames"].iter().any(|end| path.ends_with(end))
-                    || path.contains("/v1/history/");
+                let is_past =
+                    ["/past", "/why", "/frames", "/frames/capture"].iter().any(|end| path.ends_with(end))
+                        || path.contains("/v1/history/");
                 let time = "value=state&from_unix_ms=0&to_unix_ms=1&at_unix_ms=0&every_ms=60000";
                 let asked = if is_past { format!("{asked}?{time}") } else { asked };
                 let method = Method::from_bytes(method.to_uppercase().as_bytes()).unwrap();

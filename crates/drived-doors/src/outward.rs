@@ -1,25 +1,32 @@
-//! Where something is posted to: [`Target`].
+//! The way out: where something is posted to, and one request over a connection of its own, whatever the other side does.
 
-use std::{fmt, net::IpAddr, str::FromStr};
+use std::{fmt, net::IpAddr, pin::pin, str::FromStr, time::Duration};
 
-use hyper::Uri;
+use hyper::{Request, StatusCode, Uri, body::Body, client::conn::http1, header::RETRY_AFTER};
+use hyper_util::rt::TokioIo;
+use tokio::io::{AsyncRead, AsyncWrite};
+
+/// The longest head of an answer; its body is not read.
+const LONGEST_HEAD: usize = 16 << 10;
+/// What this program calls itself.
+pub const AGENT: &str = concat!("drived/", env!("CARGO_PKG_VERSION"));
 
 const EXPECTED: &str = "expected https://HOST/PATH, or http:// in clear, without a user's name";
 
 /// A URL of a receiver. Shown without its path: that of many a chat is its password.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Target {
-    pub(crate) host: String,
-    pub(crate) port: u16,
-    pub(crate) tls: bool,
+pub struct Target {
+    pub host: String,
+    pub port: u16,
+    pub tls: bool,
     /// As the header `Host` has it.
-    pub(crate) authority: String,
-    pub(crate) path: String,
+    pub authority: String,
+    pub path: String,
 }
 
 impl Target {
     /// Whether what is said in clear stays on this machine.
-    pub(crate) fn is_here(&self) -> bool {
+    pub fn is_here(&self) -> bool {
         self.host == "localhost" || self.host.parse().is_ok_and(|address: IpAddr| address.is_loopback())
     }
 }
@@ -55,6 +62,38 @@ impl fmt::Display for Target {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}://{}", if self.tls { "https" } else { "http" }, self.authority)
     }
+}
+
+/// What the head of an answer says.
+#[derive(Debug, Clone, Copy)]
+pub struct Answer {
+    pub status: StatusCode,
+    /// After how long it may be tried again, where it says so.
+    pub after: Option<Duration>,
+}
+
+/// Sends a request over a connection of its own. It waits for as long as the other side does: whoever asks sets its time.
+///
+/// # Errors
+/// It was not sent, or nobody knows.
+pub async fn exchange<B>(
+    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    request: Request<B>,
+) -> Result<Answer, hyper::Error>
+where
+    B: Body<Data: Send, Error: Into<Box<dyn std::error::Error + Send + Sync>>> + 'static,
+{
+    let mut builder = http1::Builder::new();
+    let (mut sender, connection) = builder.max_buf_size(LONGEST_HEAD).handshake(TokioIo::new(stream)).await?;
+    let mut answer = pin!(sender.send_request(request));
+    let answer = tokio::select! {
+        biased;
+        answer = &mut answer => answer,
+        // With the connection the answer is known: it came, or never will.
+        _ = connection => answer.await,
+    }?;
+    let after = answer.headers().get(RETRY_AFTER).and_then(|after| after.to_str().ok()?.parse().ok());
+    Ok(Answer { status: answer.status(), after: after.map(Duration::from_secs) })
 }
 
 #[cfg(test)]
