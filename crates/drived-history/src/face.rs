@@ -20,6 +20,7 @@ use crate::{
     listen::{Clocks, Listening},
     maintenance,
     past::InFile,
+    untold::Ledger,
     write::{
         inbox::Inbox,
         writer::{Health, Writer},
@@ -165,6 +166,8 @@ impl Recorder {
         let past =
             InFile { path: path.clone(), limits, inbox: inbox.clone(), clocks, done: Arc::clone(&done) };
         around.plant.set_past(Some(Arc::new(past)));
+        let ledger = Ledger::new(path.clone(), inbox.clone(), clocks);
+        around.plant.set_untold(Some(Arc::new(ledger)));
         let (health, seen) = watch::channel(Health::Opening);
         let listening = Listening::start(&around.plant, &inbox, clocks, seen);
         let clock = move || clocks.now();
@@ -202,6 +205,7 @@ impl Open for Recorder {
         Box::pin(async move {
             let Some(Recording { plant, listening, tasks, inbox, writing }) = self.0 else { return };
             plant.set_past(None);
+            plant.set_untold(None);
             drop((listening, tasks));
             inbox.end();
             let joined = tokio::task::spawn_blocking(move || writing.map(JoinHandle::join));

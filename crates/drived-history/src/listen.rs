@@ -67,7 +67,8 @@ impl Clocks {
         Moment { steady_ms: self.of(Instant::now()), wall_ms: milliseconds(wall) }
     }
 
-    fn of(&self, at: Instant) -> i64 {
+    /// A moment of the runtime's clock.
+    pub(crate) fn of(&self, at: Instant) -> i64 {
         match at.checked_duration_since(self.0) {
             Some(after) => milliseconds(after),
             None => -milliseconds(self.0.duration_since(at)),

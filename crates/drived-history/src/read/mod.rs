@@ -3,6 +3,7 @@
 //! Moments are milliseconds since 1970 by the wall's clock as it stood then. Where that clock was set back, what was told twice of one time is
 //! given in the order of the daemon's own clock.
 
+mod as_read;
 mod days;
 mod frames;
 mod lines;
@@ -15,6 +16,7 @@ use std::{collections::BTreeSet, path::Path};
 
 use rusqlite::{Connection, OptionalExtension as _, params};
 
+pub(crate) use self::as_read::{Page, Read, as_read};
 pub use self::{
     days::{Ran, days, ran},
     frames::{Frame, frames},

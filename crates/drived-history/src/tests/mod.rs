@@ -2,6 +2,7 @@
 
 mod asked;
 mod faults;
+mod untold;
 mod week;
 
 use std::sync::Arc;
