@@ -15,11 +15,16 @@ use tokio::time::Instant;
 use super::{BEGIN_MS, Pump};
 use crate::{
     listen::Clocks,
-    quantity::Quantity,
+    quantity::{Quantity, Set},
+    read::{History, pieces},
     record::Moment,
     store::{self, Store},
+    tracker::Tracker,
     untold::Ledger,
-    write::{archive::Archive, inbox::Inbox},
+    write::{
+        archive::Archive,
+        inbox::{Batch, Inbox, Shown},
+    },
 };
 
 const HOST: &str = "sparkplug plant/hall 1";
@@ -299,4 +304,38 @@ async fn a_run_in_which_nobody_was_told_anything_is_told_by_a_later_one() {
         seconds(&came, "a")
     });
     assert_eq!(told, [[each(1..=10), each(26..=30)].concat(), each(0..=60), each(0..=5)]);
+}
+
+/// What is written in between says nothing of the other set of the same drive.
+#[tokio::test(start_paused = true)]
+async fn a_drive_whose_two_sets_are_written_again_and_again_has_no_gaps_by_that() {
+    let folder = Folder::new("untold-sets");
+    let mut daemon = Daemon::begin(&folder, BEGIN_MS);
+    let mut slow = Tracker::default();
+    for second in 0..=100 {
+        daemon.live(second..=second);
+        if second % 7 == 3 {
+            let seen = slow.see(second * 1_000, 10_000, &[(Quantity::INPUTS, second % 2)]).unwrap();
+            let shown = Shown { drive: "a".into(), set: Set::Measurements, seen };
+            daemon.archive.take(Batch { shown: vec![shown], ..Batch::default() }, daemon.moment(0));
+        }
+        if second % 20 == 0 {
+            daemon.write(second);
+        }
+    }
+    daemon.note(Some((90, 90)), None);
+    daemon.write(100);
+    let came = daemon.tell();
+    let gaps: Vec<_> = came.iter().filter(|(_, (_, is))| is.is_none()).collect();
+    assert!(gaps.is_empty(), "{gaps:?}");
+    let of_both = |second: i64| (second, 8 + usize::from(second % 7 == 3));
+    assert_eq!(seconds(&came, "a"), (1..=90).map(of_both).collect::<Vec<_>>());
+    // Read at once, each of its values stands there in its order, too.
+    let history = History::open(&folder.file("history.sqlite")).unwrap();
+    for quantity in [Quantity(12), Quantity::INPUTS] {
+        for piece in pieces(&history.0, "a", quantity, BEGIN_MS, BEGIN_MS + 100_000).unwrap() {
+            assert!(piece.points.is_sorted_by(|one, next| one.at < next.at), "{quantity}: {piece:?}");
+            assert!(piece.points.iter().all(|point| point.count.is_some()), "{quantity}: {piece:?}");
+        }
+    }
 }
