@@ -2,7 +2,10 @@
 
 use drive_fleet::DriveSettings;
 use drive_sparkplug::{Definition, Id, Metric, NodeName, Payload, Quality, Raw, Reading};
+use serde_json::json;
 use tokio::time::sleep;
+
+mod historical;
 
 use super::*;
 use crate::{
@@ -28,6 +31,7 @@ fn config(name: &str) -> SparkplugConfig {
         commands: Some(Role::Operate),
         lifetime: Duration::from_secs(1),
         rebirth_pause: Duration::from_secs(5),
+        historical: false,
         state,
     }
 }
