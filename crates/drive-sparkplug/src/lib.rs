@@ -54,6 +54,7 @@
 //!   again gets them once in each [`Settings::rebirth_pause`].
 //! - With a primary host nothing is said before it is online. When it goes, the node dies, and begins again at the next
 //!   server. A state that is older than one that this connection has brought is nothing.
+//! - What is told of the past is historical, with its own time and quality, and changes nothing of what is so now.
 //! - Leaving is the node's death and a DISCONNECT by which the server sends the will too.
 //!
 //! # Hostile payloads
@@ -61,8 +62,8 @@
 //! without being looked into. A metric that no birth has told, of another type, or no number, is a [`WriteError`].
 //!
 //! # Not carried
-//! Templates, data sets, arrays, files and metadata; historical values, since nothing is stored for later; the part of a
-//! host.
+//! Templates, data sets, arrays, files and metadata; the part of a host. Nothing is stored for later: whoever keeps values tells them
+//! by [`EdgeNode::past`].
 //!
 //! # Sources
 //! Eclipse Sparkplug Specification 3.0.0, chapters 4 to 6. `tests/rules.rs` has a test for each of its numbered assertions
@@ -88,8 +89,8 @@ pub use self::{
     bd_seq::BdSeq,
     metrics::{Definition, MetricError, Reading},
     node::{
-        Action, Command, DeviceError, EdgeNode, Event, Ignored, Now, Publication, Settings, Subscription,
-        Write, WriteError,
+        Action, Command, DeviceError, EdgeNode, Event, Ignored, Now, PastError, Publication, Settings,
+        Subscription, Write, WriteError,
     },
     payload::{LONGEST_PAYLOAD, MOST_METRICS, Malformed, Metric, Payload},
     topic::{Id, IdError, NodeName},

@@ -18,6 +18,18 @@ impl Definition {
     pub fn new(name: impl Into<Cow<'static, str>>, data_type: DataType) -> Self {
         Self { name: name.into(), data_type }
     }
+
+    /// A reading that this can hold: a number that is not finite is no value.
+    fn checked(&self, reading: Reading) -> Result<Reading, MetricError> {
+        let (name, expected) = (self.name.clone().into_owned(), self.data_type);
+        match &reading.value {
+            Some(value) if value.data_type() != expected => {
+                Err(MetricError::WrongType { name, expected, found: value.data_type() })
+            }
+            Some(value) if !value.is_sound() => Ok(Reading { value: None, quality: Quality::Bad, ..reading }),
+            _ => Ok(reading),
+        }
+    }
 }
 
 /// What a metric holds.
@@ -91,16 +103,17 @@ impl Metrics {
     pub(crate) fn set(&mut self, name: &str, reading: Reading) -> Result<(), MetricError> {
         let slot = self.0.iter_mut().find(|slot| slot.definition.name == name);
         let slot = slot.ok_or_else(|| MetricError::Unknown(name.to_owned()))?;
-        let expected = slot.definition.data_type;
-        if let Some(found) = reading.value.as_ref().map(Value::data_type).filter(|found| *found != expected) {
-            return Err(MetricError::WrongType { name: name.to_owned(), expected, found });
-        }
-        slot.reading = if reading.value.as_ref().is_none_or(Value::is_sound) {
-            reading
-        } else {
-            Reading { value: None, quality: Quality::Bad, ..reading }
-        };
+        slot.reading = slot.definition.checked(reading)?;
         Ok(())
+    }
+
+    /// What it held once, as data tell it: nothing of what is held or was said now changes.
+    pub(crate) fn past(&self, name: &str, reading: Reading) -> Result<Metric, MetricError> {
+        let slot = self.0.iter().find(|slot| slot.definition.name == name);
+        let slot = slot.ok_or_else(|| MetricError::Unknown(name.to_owned()))?;
+        let reading = slot.definition.checked(reading)?;
+        let quality = Some(reading.quality);
+        Ok(Metric { is_historical: true, quality, ..told(slot.alias, &reading) })
     }
 
     /// The definition behind the name or the alias of a metric that somebody writes.
@@ -149,13 +162,18 @@ impl Slot {
     }
 
     fn metric(&self) -> Metric {
-        Metric {
-            alias: Some(self.alias),
-            timestamp: Some(self.reading.unix_ms),
-            is_null: self.reading.value.is_none(),
-            value: self.reading.value.as_ref().map(Value::to_raw),
-            ..Metric::default()
-        }
+        told(self.alias, &self.reading)
+    }
+}
+
+/// A reading under an alias.
+fn told(alias: u64, reading: &Reading) -> Metric {
+    Metric {
+        alias: Some(alias),
+        timestamp: Some(reading.unix_ms),
+        is_null: reading.value.is_none(),
+        value: reading.value.as_ref().map(Value::to_raw),
+        ..Metric::default()
     }
 }
 

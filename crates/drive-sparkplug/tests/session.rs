@@ -6,8 +6,8 @@ mod support;
 use std::time::Duration;
 
 use drive_sparkplug::{
-    BdSeq, Command, Definition, DeviceError, Event, Id, Ignored, Metric, MetricError, Payload, Quality, Raw,
-    Reading, Settings, Value, Write, WriteError,
+    Action, BdSeq, Command, Definition, DeviceError, Event, Id, Ignored, Metric, MetricError, PastError,
+    Payload, Quality, Raw, Reading, Settings, Value, Write, WriteError,
 };
 use support::{Rig, definitions, protobuf, recording::Packet, settings, written};
 
@@ -320,4 +320,82 @@ fn a_broken_connection_begins_again_with_births() {
     assert_eq!(rig.mark(), mark, "nor is there anything to leave");
     rig.connect();
     assert_eq!(rig.topics(mark), ["NBIRTH", "DBIRTH pump 1"]);
+}
+
+/// What a pump held at a time.
+fn held(hertz: Option<f64>, unix_ms: u64) -> (&'static str, Reading) {
+    let quality = if hertz.is_some() { Quality::Good } else { Quality::Stale };
+    ("Status/Output Frequency", Reading { value: hertz.map(Value::Double), quality, unix_ms })
+}
+
+#[test]
+fn what_was_once_is_told_with_its_own_time_and_changes_nothing_of_what_is_now() {
+    let mut rig = alive();
+    let before = last(&rig);
+    let now = rig.now;
+    let past = [held(Some(20.0), 2_000), held(None, 3_000), held(Some(12.5), 1_000)];
+    let message = rig.node.past("pump 1", past, now).unwrap();
+    assert_eq!((message.topic.as_str(), message.qos), ("spBv1.0/plant/DDATA/hall 1/pump 1", 0));
+    let payload = protobuf::read(&message.payload).unwrap();
+    assert_eq!(payload.seq, before.seq.map(|seq| seq + 1), "it has a number as every other");
+    assert_eq!(payload.timestamp, Some(now.unix_ms));
+    let alias =
+        before.metrics.iter().find(|metric| metric.name.as_deref() == Some("Status/Output Frequency"));
+    let alias = alias.and_then(|metric| metric.alias);
+    let told: Vec<_> = payload
+        .metrics
+        .iter()
+        .map(|metric| {
+            assert!(metric.is_historical && metric.name.is_none() && metric.alias == alias, "{metric:?}");
+            (metric.timestamp, metric.double(), metric.is_null, metric.quality())
+        })
+        .collect();
+    let expected = [
+        (Some(2_000), Some(20.0), false, Some(192)),
+        (Some(3_000), None, true, Some(500)),
+        (Some(1_000), Some(12.5), false, Some(192)),
+    ];
+    assert_eq!(told, expected);
+    // What it holds is what it held, so that nothing is to be said; and what changes is said.
+    assert_eq!(rig.node.poll(now), None);
+    let mark = rig.mark();
+    rig.run("pump 1", 11.0);
+    assert_eq!(rig.topics(mark), ["DDATA pump 1"]);
+    let next = last(&rig);
+    assert_eq!(next.seq, before.seq.map(|seq| seq + 2));
+    assert!(!next.metrics[0].is_historical);
+    assert_eq!(next.metrics[0].quality(), None, "its quality is what it was");
+}
+
+#[test]
+fn nothing_of_the_past_is_told_before_a_birth_nor_of_what_no_birth_has_told() {
+    let mut rig = Rig::new(settings());
+    rig.run("pump 1", 10.0);
+    let now = rig.now;
+    let one = || [held(Some(20.0), 1_000)];
+    let not_born = |device: &str| Err(PastError::NotBorn(device.to_owned()));
+    assert_eq!(rig.node.past("pump 1", one(), now), not_born("pump 1"));
+    rig.connect();
+    assert!(rig.node.past("pump 1", one(), now).is_ok());
+    assert!(rig.node.is_born("pump 1") && !rig.node.is_born("fan 1"));
+    assert_eq!(rig.node.past("fan 1", one(), now), not_born("fan 1"), "it has never answered");
+    assert_eq!(rig.node.past("pump 9", one(), now), not_born("pump 9"));
+    let reading = Reading { value: Some(Value::Double(1.0)), quality: Quality::Good, unix_ms: 1 };
+    let unknown = rig.node.past("pump 1", [("Speed", reading.clone())], now);
+    assert_eq!(unknown, Err(MetricError::Unknown("Speed".to_owned()).into()));
+    let wrong = rig.node.past("pump 1", [("Counts", reading)], now);
+    assert!(matches!(wrong, Err(PastError::Metric(MetricError::WrongType { .. }))), "{wrong:?}");
+    // From a request for births to them no data are sent, also none of these.
+    rig.wait(Duration::from_secs(1));
+    rig.ask_for_rebirth();
+    assert!(!rig.node.is_told());
+    assert_eq!(rig.node.past("pump 1", one(), now), not_born("pump 1"));
+    rig.wait(Duration::from_secs(60));
+    let mark = last(&rig).seq;
+    let Ok(message) = rig.node.past("pump 1", one(), now) else { panic!("the births have been told") };
+    let numbered = protobuf::read(&message.payload).and_then(|payload| payload.seq);
+    assert_eq!(numbered, mark.map(|seq| seq + 1), "those that could not be told have taken no number");
+    rig.node.set_present("pump 1", false);
+    assert_eq!(rig.node.past("pump 1", one(), now), not_born("pump 1"));
+    assert!(matches!(rig.node.poll(now), Some(Action::Publish(death)) if death.topic.contains("/DDEATH/")));
 }

@@ -114,7 +114,9 @@ fn of_sparkplug(sparkplug: &SparkplugConfig) -> String {
         Role::Stop => "WHOEVER MAY PUBLISH THERE STOPS",
         _ => "WHOEVER MAY PUBLISH THERE OPERATES",
     });
-    format!("{group}/{edge_node}{}: {may}", host.unwrap_or_default())
+    let later =
+        if sparkplug.historical { "; what the history kept of an outage is told behind it" } else { "" };
+    format!("{group}/{edge_node}{}: {may}{later}", host.unwrap_or_default())
 }
 
 /// Both while they are open.

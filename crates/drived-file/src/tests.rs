@@ -592,13 +592,14 @@ fn without_a_section_the_daemon_is_no_edge_node_and_hosts_command_nothing_unless
     assert_eq!(edge_node(&read(&format!("[mqtt]\nservers = [\"mqtts://broker\"]\n{BROKER}")).unwrap()), None);
     let least = with_edge_node("group = \"plant\"\nedge_node = \"hall 1\"\nstate = \"bd-seq\"").unwrap();
     assert_eq!((least.name.group.as_str(), least.name.edge_node.as_str()), ("plant", "hall 1"));
-    assert_eq!((least.primary_host, least.commands), (None, None));
+    assert_eq!((least.primary_host, least.commands, least.historical), (None, None, false));
     assert_eq!((least.lifetime, least.rebirth_pause), (Duration::from_secs(1), Duration::from_secs(5)));
     let more = "group = \"plant\"\nedge_node = \"x\"\nstate = \"/var/bd-seq\"\nprimary_host = \"scada\"\n\
-                commands = \"stop\"\nlifetime = \"5s\"";
+                commands = \"stop\"\nlifetime = \"5s\"\nhistorical = true";
     let more = with_edge_node(more).unwrap();
     assert_eq!(more.primary_host.map(|host| host.to_string()), Some("scada".to_owned()));
     assert_eq!((more.commands, more.lifetime), (Some(Role::Stop), Duration::from_secs(5)));
+    assert!(more.historical);
     assert_eq!(more.state, Path::new("/var/bd-seq"));
 }
 
@@ -612,6 +613,7 @@ fn what_is_wrong_with_an_edge_node_is_told_with_its_place() {
         (format!("{least}commands = \"engineer\""), "expected one of off, stop, operate"),
         (format!("{least}lifetime = \"11s\""), "expected up to 10s"),
         (format!("{least}retain = true"), "unknown field"),
+        (format!("{least}historical = \"yes\""), "expected a boolean"),
     ] {
         let told = with_edge_node(&section).expect_err(&section);
         assert!(told.starts_with("drives.toml:") && told.contains(problem), "{section}: {told}");

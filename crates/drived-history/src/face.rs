@@ -21,6 +21,7 @@ use crate::{
     listen::Listening,
     maintenance,
     past::InFile,
+    untold::Ledger,
     write::{
         inbox::Inbox,
         writer::{Health, Writer},
@@ -166,6 +167,8 @@ impl Recorder {
         let past =
             InFile { path: path.clone(), limits, inbox: inbox.clone(), clocks, done: Arc::clone(&done) };
         around.plant.set_past(Some(Arc::new(past)));
+        let ledger = Ledger::new(path.clone(), inbox.clone(), clocks);
+        around.plant.set_untold(Some(Arc::new(ledger)));
         let (health, seen) = watch::channel(Health::Opening);
         let listening = Listening::start(&around.plant, &inbox, clocks, seen);
         let clock = move || clocks.now();
@@ -203,6 +206,7 @@ impl Open for Recorder {
         Box::pin(async move {
             let Some(Recording { plant, listening, tasks, inbox, writing }) = self.0 else { return };
             plant.set_past(None);
+            plant.set_untold(None);
             drop((listening, tasks));
             inbox.end();
             let joined = tokio::task::spawn_blocking(move || writing.map(JoinHandle::join));

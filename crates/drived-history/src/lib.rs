@@ -26,6 +26,7 @@ pub mod forward;
 mod gone;
 mod listen;
 mod maintenance;
+pub mod outages;
 mod past;
 pub mod quantity;
 pub mod read;
@@ -35,6 +36,7 @@ mod stop_key;
 pub mod store;
 pub mod story;
 pub mod tracker;
+mod untold;
 pub mod write;
 
 pub use self::face::{FACE, config_of};

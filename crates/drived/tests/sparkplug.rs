@@ -6,6 +6,8 @@
 
 #[path = "support/mosquitto.rs"]
 mod mosquitto;
+#[path = "sparkplug/outage.rs"]
+mod outage;
 #[path = "../../drive-sparkplug/tests/support/protobuf.rs"]
 mod protobuf;
 #[path = "../../drive-sparkplug/tests/support/recording.rs"]
@@ -66,13 +68,18 @@ impl Plant {
 
     /// The same of other drives, with what else their table says.
     fn prepare_of(drives: &str, says: &str, name: &str, more: &str) -> Option<Self> {
+        Self::prepare_at("off", drives, says, name, more)
+    }
+
+    /// The same with an API that listens there.
+    fn prepare_at(http: &str, drives: &str, says: &str, name: &str, more: &str) -> Option<Self> {
         let broker = Mosquitto::start(name)?;
         let tap = Tap::start(broker.port, "-sparkplug");
         let sim = Sim::serve(&format!("{name}-line"), &[drives]);
         let state = path(&format!("{name}-bd-seq"));
         let _ = std::fs::remove_file(&state);
         let text = format!(
-            "[http]\nlisten = \"off\"\n[mqtt]\nservers = [\"mqtt://127.0.0.1:{}\"]\ninterval = \"250ms\"\n\
+            "[http]\nlisten = \"{http}\"\n[mqtt]\nservers = [\"mqtt://127.0.0.1:{}\"]\ninterval = \"250ms\"\n\
              [mqtt.sparkplug]\ngroup = \"plant\"\nedge_node = \"hall 1\"\nstate = \"{}\"\n{more}\n\
              [lines.north]\nport = \"{},19200,8E1\"\n[[drives]]\nline = \"north\"\ndrive = \"{drives}\"\n\
              name = \"pump {{}}\"\ncontrol = true\n{says}\n",

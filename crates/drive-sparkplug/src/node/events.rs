@@ -135,6 +135,18 @@ pub enum Ignored {
     RetainedRebirth,
 }
 
+/// Why nothing of the past can be told of a device.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PastError {
+    /// Its birth has not been told in this session, or births have been asked for.
+    #[error("the birth of {0:?} has not been told")]
+    NotBorn(String),
+    /// One of the metrics is none of its birth, or of another type.
+    #[error(transparent)]
+    Metric(#[from] MetricError),
+}
+
 /// Why a device cannot be added.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]

@@ -6,7 +6,8 @@ mod hearing;
 use std::time::Instant;
 
 pub use self::events::{
-    Action, Command, DeviceError, Event, Ignored, Now, Publication, Settings, Subscription, Write, WriteError,
+    Action, Command, DeviceError, Event, Ignored, Now, PastError, Publication, Settings, Subscription, Write,
+    WriteError,
 };
 use crate::{
     BdSeq, Definition, Id, Metric, MetricError, NodeName, Payload, Reading, Value,
@@ -262,6 +263,40 @@ impl EdgeNode {
             }
         }
         None
+    }
+
+    /// Whether everything that is held has been told, as far as [`Self::poll`] has nothing more to say: there is a birth, and none is
+    /// awaited.
+    pub fn is_told(&self) -> bool {
+        self.is_alive() && self.rebirth_at.is_none()
+    }
+
+    /// Whether a device can be told of: its birth has been said in this session.
+    pub fn is_born(&self, id: &str) -> bool {
+        self.devices.iter().any(|device| device.id.as_str() == id && device.is_born && device.is_present)
+    }
+
+    /// What a device held in the past, as data by which nobody takes it for what it holds now. The message has its number: publish it before
+    /// anything else that [`Self::poll`] says, and poll before it until that is nothing, so that what is so now is told first.
+    ///
+    /// Each reading tells its own time and its quality. They may stand in any order.
+    ///
+    /// # Errors
+    /// [`PastError`], and then nothing is to be said: it can be told later, or never.
+    pub fn past(
+        &mut self,
+        id: &str,
+        readings: impl IntoIterator<Item = (impl AsRef<str>, Reading)>,
+        now: Now,
+    ) -> Result<Publication, PastError> {
+        if !self.is_told() || !self.is_born(id) {
+            return Err(PastError::NotBorn(id.to_owned()));
+        }
+        let device = self.devices.iter().find(|device| device.id.as_str() == id && device.is_born);
+        let device = device.ok_or_else(|| PastError::NotBorn(id.to_owned()))?;
+        let told = readings.into_iter().map(|(name, reading)| device.metrics.past(name.as_ref(), reading));
+        let (metrics, id) = (told.collect::<Result<Vec<_>, _>>()?, device.id.clone());
+        Ok(self.message(Verb::Data, Some(&id), metrics, now))
     }
 
     /// The birth of the node: everything that was born before it is born again behind it.

@@ -264,7 +264,11 @@ fn is_own(metric: &Metric) -> bool {
 }
 
 fn is_chronological(said: &Said) -> bool {
-    said.payload.metrics.is_sorted_by_key(|metric| metric.timestamp)
+    said.payload
+        .metrics
+        .iter()
+        .filter(|metric| !metric.is_historical)
+        .is_sorted_by_key(|metric| metric.timestamp)
 }
 
 fn will_number(recording: &Recording, session: usize) -> Option<u64> {
@@ -464,6 +468,10 @@ fn only_changes(recording: &Recording, verb: &str) -> Verdict {
     for said in recording.said.iter().filter(|said| said.is_birth() || said.is_data()) {
         for metric in &said.payload.metrics {
             let Some(alias) = metric.alias else { continue };
+            // What was so once says nothing of what is so now.
+            if metric.is_historical {
+                continue;
+            }
             let before = told.get(&alias);
             let quality = metric.quality().or(before.and_then(|(_, quality)| *quality));
             let now = (metric.value.clone(), quality);

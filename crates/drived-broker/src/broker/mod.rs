@@ -24,7 +24,7 @@ use std::{
 };
 
 use tokio::{
-    sync::{Notify, mpsc, watch},
+    sync::{Notify, mpsc, oneshot, watch},
     time::{Instant, sleep, timeout},
 };
 
@@ -33,7 +33,10 @@ pub use self::{
     queue::{Counts, Kept},
     tls::Secured,
 };
-use self::{queue::Queue, session::Ended};
+use self::{
+    queue::{Queue, Sign},
+    session::Ended,
+};
 
 /// From the end of a connection to the next try: at first, and at the longest. Each time is drawn from its last half, so
 /// that many daemons do not come back together.
@@ -204,6 +207,16 @@ impl Broker {
     pub fn subscribe(&self, subscriptions: impl IntoIterator<Item = Subscription>) {
         self.shared.queue().ask(subscriptions);
         self.shared.work.notify_one();
+    }
+
+    /// Asks the broker for a sign behind everything that was published in order before: for a subscription that it has given already, which
+    /// changes nothing. A broker takes what comes by one connection in its order, so that its answer says that it has what was published.
+    /// An error: there is none, for the connection has ended before it or nothing more can be asked now.
+    pub fn sign(&self, again: Subscription) -> oneshot::Receiver<()> {
+        let (seen, sees) = oneshot::channel();
+        self.shared.queue().ask_behind(Sign { asked: again, seen });
+        self.shared.work.notify_one();
+        sees
     }
 
     pub fn counts(&self) -> Counts {

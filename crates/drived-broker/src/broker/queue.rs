@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, VecDeque};
 
-use tokio::time::Instant;
+use tokio::{sync::oneshot, time::Instant};
 
 use super::{
     Subscription,
@@ -14,6 +14,8 @@ const STATES: usize = 1 << 17;
 /// Subscriptions that may wait, and that are sent together.
 const ASKED: usize = 4_096;
 const TOGETHER: usize = 32;
+/// Signs of the broker that may be waited for.
+const SIGNS: usize = 16;
 /// A message whose connection has broken so often while it was on its way is taken for the reason.
 const TRIES: u8 = 3;
 
@@ -81,10 +83,21 @@ pub(super) struct Limits {
     pub(super) size: usize,
 }
 
+/// What is asked behind messages, so that its answer shows that the broker has taken them.
+#[derive(Debug)]
+pub(super) struct Sign {
+    pub(super) asked: Subscription,
+    pub(super) seen: oneshot::Sender<()>,
+}
+
 #[derive(Debug)]
 pub(super) struct Queue {
     most: usize,
     news: VecDeque<Waiting>,
+    /// How many of them have been handed over or given up, since the beginning.
+    passed: u64,
+    /// Each with how many messages have to have passed before it is asked.
+    signs: VecDeque<(u64, Sign)>,
     /// The topics of `state` in the order in which they are sent.
     order: VecDeque<String>,
     state: HashMap<String, Message>,
@@ -99,6 +112,8 @@ impl Queue {
         Self {
             most,
             news: VecDeque::new(),
+            passed: 0,
+            signs: VecDeque::new(),
             order: VecDeque::new(),
             state: HashMap::new(),
             asked: VecDeque::new(),
@@ -134,6 +149,7 @@ impl Queue {
             Kept::InOrder => {
                 if self.news.len() >= self.most {
                     self.news.pop_front();
+                    self.passed += 1;
                     self.counts.lost.no_room += 1;
                 }
             }
@@ -146,7 +162,10 @@ impl Queue {
     pub(super) fn pop(&mut self, now: Instant, limits: Limits) -> Option<Waiting> {
         loop {
             let mut waiting = match self.news.pop_front() {
-                Some(waiting) => waiting,
+                Some(waiting) => {
+                    self.passed += 1;
+                    waiting
+                }
                 None => {
                     let message = self.state.remove(&self.order.pop_front()?)?;
                     Waiting { message, kept: Kept::Latest, tries: 0 }
@@ -184,6 +203,23 @@ impl Queue {
         self.asked.drain(..number.min(self.asked.len()));
     }
 
+    /// Takes a sign that is to be asked behind what waits in order, in this connection. Above a bound it is dropped, which its reader sees.
+    pub(super) fn ask_behind(&mut self, sign: Sign) {
+        if self.connection.is_some() && self.signs.len() < SIGNS {
+            let behind = self.passed + self.news.len() as u64;
+            self.signs.push_back((behind, sign));
+        }
+    }
+
+    /// The next sign before which everything has passed.
+    pub(super) fn sign(&mut self) -> Option<Sign> {
+        let (behind, _) = self.signs.front()?;
+        if *behind > self.passed {
+            return None;
+        }
+        self.signs.pop_front().map(|(_, sign)| sign)
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.news.is_empty() && self.order.is_empty()
     }
@@ -198,6 +234,7 @@ impl Queue {
         self.state.clear();
         self.order.clear();
         self.asked.clear();
+        self.signs.clear();
         self.news.retain(|waiting| waiting.kept == Kept::InOrder);
         self.counts.connected = false;
         self.connection.take().is_some()

@@ -12,7 +12,10 @@ use std::{
     time::Duration,
 };
 
-use futures_util::{StreamExt as _, stream::FuturesOrdered};
+use futures_util::{
+    StreamExt as _,
+    stream::{FuturesOrdered, FuturesUnordered},
+};
 use rumqttc::{
     AsyncClient, ConnAck, ConnectionError, DisconnectProperties, DisconnectReasonCode, EventLoop, LastWill,
     LastWillProperties, MqttOptions, Packet, Publish, PublishOptions, PublishProperties, QoS,
@@ -27,7 +30,7 @@ use tokio::{
 use super::{
     Arrived, Attempt, Connection, EVENTS, Event, Goodbye, Message, Options, Properties, Qos, Shared,
     Subscription, Then, Wanted, Will, prompt,
-    queue::{Limits, Waiting},
+    queue::{Limits, Sign, Waiting},
 };
 
 /// How long a broker may take until it has answered CONNECT, and again until it has answered SUBSCRIBE.
@@ -193,6 +196,9 @@ impl Writer<'_> {
         let mut notices = FuturesOrdered::new();
         let mut leaving: Option<(Goodbye, Then, Instant)> = None;
         let mut answers = FuturesOrdered::new();
+        // Messages that the crate was given, and those of them that are gone; signs that are asked behind so many.
+        let (mut given, mut gone) = (0_u64, 0_u64);
+        let (mut signs, mut seen) = (VecDeque::new(), FuturesUnordered::new());
         loop {
             while let Some(notice) = self.ask() {
                 answers.push_back(notice.wait_completion_async());
@@ -205,10 +211,17 @@ impl Writer<'_> {
                 match self.client.try_publish_tracked(topic, payload, published(&waiting.message)) {
                     Ok(notice) => {
                         notices.push_back(notice.wait_completion_async());
+                        given += 1;
                         lock(self.on_their_way).push_back(waiting);
                     }
                     Err(_) => self.shared.queue().count_sent(false),
                 }
+            }
+            signs.extend(std::iter::from_fn(|| self.shared.queue().sign()).map(|sign| (given, sign)));
+            // The crate sends what is asked before messages that it has: so these have to be gone.
+            while signs.front().is_some_and(|(behind, _)| *behind <= gone) {
+                let sign = signs.pop_front();
+                seen.extend(sign.and_then(|(_, sign)| self.ask_for(sign)));
             }
             if let Some((goodbye, then, until)) = leaving
                 && (notices.is_empty() && self.shared.queue().is_empty() || Instant::now() >= until)
@@ -220,6 +233,7 @@ impl Writer<'_> {
             tokio::select! {
                 Some(result) = notices.next() => {
                     let sent = lock(self.on_their_way).pop_front();
+                    gone += 1;
                     self.shared.queue().count_sent(result.is_ok());
                     if let (Err(error), Some(sent)) = (result, sent) {
                         tracing::warn!("MQTT: the broker does not take {:?}: {error}", sent.message.topic);
@@ -227,6 +241,7 @@ impl Writer<'_> {
                 }
                 // What the broker refuses is said where its answer is read.
                 Some(_) = answers.next() => {}
+                Some(()) = seen.next() => {}
                 () = self.shared.work.notified(), if notices.len() < ON_THEIR_WAY => {}
                 (goodbye, then) = asked(leaves), if leaving.is_none() => {
                     leaving = Some((goodbye, then, Instant::now() + DRAINED_WITHIN));
@@ -242,6 +257,18 @@ impl Writer<'_> {
         let notice = self.client.try_subscribe_many_tracked(asked.iter().map(filter)).ok()?;
         self.shared.queue().has_asked(asked.len());
         Some(notice)
+    }
+
+    /// Asks for a sign, and gives what waits for it; nothing where the crate has no room for it now.
+    fn ask_for(&self, sign: Sign) -> Option<impl Future<Output = ()> + use<>> {
+        let Sign { asked, seen } = sign;
+        let notice = self.client.try_subscribe_many_tracked([filter(&asked)]).ok()?;
+        Some(async move {
+            if notice.wait_async().await.is_ok() {
+                // Whoever does not wait any more misses nothing.
+                let _ = seen.send(());
+            }
+        })
     }
 
     async fn say(&self, goodbye: Goodbye, then: Then) -> Then {

@@ -275,3 +275,37 @@ async fn a_flood_is_turned_away_and_what_is_urgent_gets_through() {
     }
     assert_eq!(last.as_deref(), Some("stop"));
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_sign_of_the_broker_says_that_it_has_what_was_published_before() {
+    let far = TestBroker::default();
+    let asked =
+        || Subscription { filter: "plant/command".to_owned(), qos: Qos::AtLeastOnce, wanted: Wanted::News };
+    let (broker, mut events) = start(Options { queue: 1_000, subscriptions: vec![asked()], ..far.options() });
+    assert!(broker.sign(asked()).await.is_err(), "there is no connection");
+    let connection = connected(&mut events).await.number;
+    let publish = |from: u32, to: u32| {
+        for number in from..to {
+            let message = Message { qos: Qos::AtMostOnce, ..word("news", &number.to_string()) };
+            assert!(broker.publish(message, Kept::OfConnection(connection)));
+        }
+    };
+    // More than are on their way at once.
+    publish(0, 200);
+    let sign = broker.sign(asked());
+    publish(200, 300);
+    sign.await.unwrap();
+    let published = far.published().len();
+    assert!(published >= 200, "{published}");
+    far.until(|far| far.published().len() == 300).await;
+    let expected: Vec<_> = (0..300).map(|number: u32| ("news".to_owned(), number.to_string())).collect();
+    assert_eq!(far.published(), expected, "a sign changes no order and costs no message");
+
+    // A broker that does not answer gives none, nor does one that is lost; and it holds up no message.
+    far.behave(Conduct::Deaf);
+    let (sign, later) = (broker.sign(asked()), broker.sign(asked()));
+    publish(300, 301);
+    far.until(|far| far.published().len() == 301).await;
+    far.cut();
+    assert!(sign.await.is_err() && later.await.is_err());
+}

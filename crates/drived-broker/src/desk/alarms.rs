@@ -2,7 +2,12 @@
 
 use tokio::time::Instant;
 
-use super::{Answers, Desk, Refusal, alarms_answer::AlarmsOrder, counter::Order, judge_time};
+use super::{
+    Answers, Desk, Refusal,
+    alarms_answer::AlarmsOrder,
+    counter::{Named, Order},
+    judge_time,
+};
 use drived_doors::{
     Caller,
     audit::{Kind, Record},
@@ -33,6 +38,7 @@ impl<A: Answers + Sync> Desk<A> {
             return;
         }
         let AlarmsSaid { body, id, issued_unix_ms, asked } = said;
+        let named = Named { id: id.clone(), ..Named::default() };
         let record = Record { body: Some(body), ..Record::new(Kind::Command, &caller, what) };
         let closing = self.closing.borrow().then_some(Refusal::Closing);
         let judged = match doubt.or(closing) {
@@ -42,12 +48,12 @@ impl<A: Answers + Sync> Desk<A> {
             }),
         };
         let order = match judged {
-            Ok(asked) => AlarmsOrder { id: id.clone(), asked },
-            Err(refusal) => return self.counter.refuse(&caller, record, &answers, (id, None), refusal),
+            Ok(asked) => AlarmsOrder { id, asked },
+            Err(refusal) => return self.counter.refuse(&caller, record, &answers, named, refusal),
         };
         let (by, audited, to) = (caller.clone(), record.clone(), answers.clone());
         if self.orders.try_send(Order::Alarms { caller: by, order, record: audited, answers: to }).is_err() {
-            self.counter.refuse(&caller, record, &answers, (id, None), Refusal::Busy);
+            self.counter.refuse(&caller, record, &answers, named, Refusal::Busy);
         }
     }
 }

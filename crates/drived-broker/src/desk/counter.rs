@@ -11,6 +11,7 @@ use tokio::{
 use super::{
     Answer, Answers, Refusal, Refused,
     alarms_answer::{AlarmsAnswer, AlarmsOrder},
+    lately::Lately,
 };
 use drived_doors::{
     Caller,
@@ -21,7 +22,7 @@ use drived_plant::{
     plant::{
         Plant,
         alarms::{AlarmDone, AlarmRejected},
-        commands::{ActionWord, OutcomeWord, Request, Told},
+        commands::{ActionWord, OutcomeWord, Request, Target, Told},
     },
 };
 use drived_words::json::unix;
@@ -29,8 +30,14 @@ use drived_words::json::unix;
 /// Commands whose outcome is waited for.
 const FOLLOWED: usize = 256;
 
-/// The id and the action of a message, as far as they are known.
-type Named = (Option<String>, Option<ActionWord>);
+/// What is known of a message.
+#[derive(Default)]
+pub(super) struct Named {
+    pub(super) id: Option<String>,
+    pub(super) action: Option<ActionWord>,
+    /// The drive that was meant, where it was one.
+    pub(super) drive: Option<String>,
+}
 
 /// What waits for its record in the audit log.
 pub(super) enum Order<A> {
@@ -43,11 +50,12 @@ pub(super) struct Counter {
     plant: Plant,
     audit: Audit,
     followed: Arc<Semaphore>,
+    refused: Lately,
 }
 
 impl Counter {
     pub(super) fn new(plant: Plant, audit: Audit) -> Self {
-        Self { plant, audit, followed: Arc::new(Semaphore::new(FOLLOWED)) }
+        Self { plant, audit, followed: Arc::new(Semaphore::new(FOLLOWED)), refused: Lately::default() }
     }
 
     /// Stops at once: no disk and no other command holds it up.
@@ -150,12 +158,12 @@ impl Counter {
         caller: &Caller,
         record: Record,
         answers: &impl Answers,
-        (id, action): Named,
+        Named { id, action, drive }: Named,
         refusal: Refusal,
     ) {
         let (outcome, reason) = refusal.told();
         self.answered(caller, record, id.clone(), outcome);
-        answers.tell(Answer::Refused(&Refused {
+        let refused = Refused {
             id,
             action,
             outcome,
@@ -164,7 +172,13 @@ impl Counter {
             caller: caller.name.clone(),
             origin: caller.origin.clone(),
             time_unix_ms: unix(Instant::now()),
-        }));
+        };
+        if let Some(drive) = drive {
+            self.plant.note_refused_command(&drive, refused.as_last());
+            let told = self.refused.of(&drive, &refused, Instant::now());
+            told.into_iter().for_each(|told| self.plant.tell_notice(told));
+        }
+        answers.tell(Answer::Refused(&refused));
     }
 
     /// Keeps the first answer in the audit log.
@@ -180,12 +194,21 @@ impl<A> Order<A> {
         match self {
             Self::Command { caller, request, record, answers } => (caller, record, answers, named(request)),
             Self::Alarms { caller, order, record, answers } => {
-                (caller, record, answers, (order.id.clone(), None))
+                let named = Named { id: order.id.clone(), ..Named::default() };
+                (caller, record, answers, named)
             }
         }
     }
 }
 
 fn named(request: &Request) -> Named {
-    (request.id.clone(), Some(request.action.word()))
+    Named { id: request.id.clone(), action: Some(request.action.word()), drive: drive_of(&request.target) }
+}
+
+/// The drive that is meant, where it is one alone.
+pub(super) fn drive_of(target: &Target) -> Option<String> {
+    match target {
+        Target::Drive(name) => Some(name.clone()),
+        _ => None,
+    }
 }

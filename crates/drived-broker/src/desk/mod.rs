@@ -7,6 +7,7 @@
 mod alarms;
 mod alarms_answer;
 mod counter;
+mod lately;
 mod pace;
 mod refusal;
 #[cfg(test)]
@@ -27,7 +28,7 @@ pub use self::{
     refusal::{Refusal, Refused},
 };
 use self::{
-    counter::{Counter, Order},
+    counter::{Counter, Named, Order},
     pace::Pace,
 };
 use drived_doors::{
@@ -117,12 +118,13 @@ impl<A: Answers + Sync> Desk<A> {
         }
         let record = self.record(&message);
         let id = message.said.id.clone().or_else(|| message.id.clone());
-        let named = (id.clone(), message.said.action);
+        let mut named = Named { id: id.clone(), action: message.said.action, drive: None };
         let Message { caller, answers, arrived, .. } = &message;
         let (caller, answers, arrived) = (caller.clone(), answers.clone(), *arrived);
         let Some(target) = message.target.take() else {
             return self.counter.refuse(&caller, record, &answers, named, Refusal::NotFound);
         };
+        named.drive = counter::drive_of(&target);
         let is_doubted = drive_fleet::mutant!("stop-of-a-broker-is-doubted", false, message.doubt.is_some());
         let waits = drive_fleet::mutant!("stop-of-a-broker-waits-for-the-disk", false, true);
         if let Some(order) = stop.filter(|_| !is_doubted && !waits) {
@@ -132,7 +134,7 @@ impl<A: Answers + Sync> Desk<A> {
             }
             self.stopped.insert(key, arrived);
             let request =
-                Request { id: named.0, target, action: Action::Stop(order), lifetime: LIFETIME, arrived };
+                Request { id: named.id, target, action: Action::Stop(order), lifetime: LIFETIME, arrived };
             return self.counter.stop(&caller, request, record, &answers);
         }
         self.stopped.clear();

@@ -51,8 +51,6 @@ pub(super) struct Commanding {
 #[derive(Clone)]
 struct To {
     face: Arc<Face>,
-    /// The drive that was meant, where it was one.
-    drive: Option<String>,
     outcome: String,
     response: Option<String>,
     correlation: Option<bytes::Bytes>,
@@ -120,7 +118,7 @@ impl Commanding {
                 arrived: arrived.at,
                 sent_unix_ms: None,
                 what: format!("MQTT {}", arrived.topic),
-                answers: self.answers(arrived, face.topics.alarms_outcome(), None),
+                answers: self.answers(arrived, face.topics.alarms_outcome()),
             });
             return;
         }
@@ -135,10 +133,6 @@ impl Commanding {
         };
         let lost = || face.topics.problem().filter(|_| !is_by_name).map(Refusal::NamesLost);
         let doubt = doubt.or_else(lost);
-        let drive = match &target {
-            Some(Target::Drive(name)) => Some(name.clone()),
-            _ => None,
-        };
         let expires = arrived.expires_in_s.filter(|seconds| *seconds > 0);
         self.desk.take(desk::Message {
             said: said(asking.verb, &arrived.payload),
@@ -153,7 +147,7 @@ impl Commanding {
             needs_id: arrived.repeated || arrived.qos == Qos::AtLeastOnce,
             id: arrived.properties.correlation.as_deref().map(id_of),
             what: format!("MQTT {}", arrived.topic),
-            answers: self.answers(arrived, face.topics.outcome(&asking.meant), drive),
+            answers: self.answers(arrived, face.topics.outcome(&asking.meant)),
         });
     }
 
@@ -164,13 +158,13 @@ impl Commanding {
     }
 
     /// Where it is told what becomes of what has arrived.
-    fn answers(&self, arrived: &Arrived, outcome: String, drive: Option<String>) -> To {
+    fn answers(&self, arrived: &Arrived, outcome: String) -> To {
         let face = Arc::clone(&self.face);
         let response = arrived.properties.response_topic.clone();
         let is_foreign = |topic: &str| face.topics.is_foreign(topic);
         let response =
             response.filter(|topic| drive_fleet::mutant!("answer-is-a-command", is_foreign(topic), true));
-        To { face, drive, outcome, response, correlation: arrived.properties.correlation.clone() }
+        To { face, outcome, response, correlation: arrived.properties.correlation.clone() }
     }
 }
 
@@ -254,14 +248,7 @@ impl Answers for To {
     fn tell(&self, answer: Answer<'_>) {
         let payload = match answer {
             Answer::Alarms(done) => json!(done),
-            Answer::Refused(refused) => {
-                if let Some(drive) = &self.drive {
-                    self.face.plant.note_refused_command(drive, refused.as_last());
-                    let told = self.face.refusals.of(drive, refused, Instant::now());
-                    told.into_iter().for_each(|told| self.face.plant.tell_notice(told));
-                }
-                json!(refused)
-            }
+            Answer::Refused(refused) => json!(refused),
             Answer::Command(view) => {
                 let mut said = json!(view);
                 if view.outcome == OutcomeWord::Pending {

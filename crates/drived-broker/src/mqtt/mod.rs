@@ -9,7 +9,6 @@ mod discovery;
 mod gone;
 mod last;
 mod parts;
-mod refused;
 mod telling;
 #[cfg(test)]
 mod tests;
@@ -26,7 +25,7 @@ use tokio::{
 
 use self::{
     alarms::Alarms, commanding::Commanding, discovery::Discovered, gone::Gone, last::LastCommands,
-    refused::Refusals, telling::Teller, topics::Topics,
+    telling::Teller, topics::Topics,
 };
 use crate::broker::{
     Broker, Event, Goodbye, Kept, Login, Message, Options, Qos, Secured, Server, Subscription, Wanted, Will,
@@ -67,7 +66,6 @@ struct Face {
     audited: watch::Receiver<Option<String>>,
     /// Rises when everything is to be told again.
     anew: watch::Sender<u64>,
-    refusals: Refusals,
 }
 
 impl Face {
@@ -201,17 +199,7 @@ impl Prepared {
             Broker::start(options, move |_| drive_fleet::mutant!("no-will", Some(will.clone()), None));
         let audited = audit.head();
         let (host, instance, anew) = (host_name(), instance(), watch::Sender::new(0));
-        let face = Arc::new(Face {
-            plant,
-            config,
-            topics,
-            broker,
-            host,
-            instance,
-            audited,
-            anew,
-            refusals: Refusals::default(),
-        });
+        let face = Arc::new(Face { plant, config, topics, broker, host, instance, audited, anew });
         let (closing, closes) = watch::channel(false);
         let commanding = Commanding::new(Arc::clone(&face), audit, closes);
         let closed = Arc::new(Notify::new());

@@ -3,7 +3,11 @@
 use drive_sparkplug::{DataType, Definition, Quality, Reading, Value};
 use serde_json::{Value as Json, json};
 
-use drived_plant::plant::alarms::{OwnAlarms, Owner};
+use drived_plant::plant::{
+    alarms::{OwnAlarms, Owner},
+    past::IsView,
+    untold::UntoldPoint,
+};
 
 /// A metric: its name, its type, and the pointer to its value.
 type Row = (&'static str, DataType, &'static str);
@@ -223,6 +227,41 @@ pub(super) fn read_drive(drive: &Json, now_unix_ms: u64) -> impl Iterator<Item =
             _ => (Quality::Good, now_unix_ms),
         };
         (name, Reading { value: value(drive, data_type, pointer), quality, unix_ms })
+    })
+}
+
+/// What the history kept of a value of a drive, as its metric; `None`: there is none of it. Where nothing was known any more it is stale.
+pub(super) fn of_the_past(kept: &UntoldPoint) -> Option<(&'static str, Reading)> {
+    let (name, data_type, _) = DRIVE.iter().find(|(_, _, pointer)| kept_as(pointer) == Some(kept.value))?;
+    let unix_ms = u64::try_from(kept.point.time_unix_ms).unwrap_or_default();
+    let value = kept.point.is.as_ref().and_then(|is| value_of_the_past(*data_type, is));
+    let quality = if value.is_some() { Quality::Good } else { Quality::Stale };
+    Some((*name, Reading { value, quality, unix_ms }))
+}
+
+/// The name in the history of what an object has there.
+fn kept_as(pointer: &'static str) -> Option<&'static str> {
+    if pointer == "/setpoint/frequency_hz" {
+        return Some("setpoint_hz");
+    }
+    let (part, name) = pointer.strip_prefix('/')?.split_once('/')?;
+    (matches!(part, "status" | "measurements") && !name.contains('/')).then_some(name)
+}
+
+/// A value of the history as one of this type: the words that both have are written with spaces there.
+fn value_of_the_past(data_type: DataType, is: &IsView) -> Option<Value> {
+    Some(match (data_type, is) {
+        (DataType::Double, IsView::Number(number)) => Value::Double(*number),
+        // Counts, which are whole.
+        (DataType::UInt64, IsView::Number(number)) if *number >= 0.0 => Value::UInt64(*number as u64),
+        (DataType::UInt32, IsView::Word(bits)) => Value::UInt32(bits.parse().ok()?),
+        (DataType::Boolean, IsView::Word(word)) => Value::Boolean(match word.as_str() {
+            "yes" => true,
+            "no" => false,
+            _ => return None,
+        }),
+        (DataType::String, IsView::Word(word)) => Value::String(word.replace(' ', "_")),
+        _ => return None,
     })
 }
 

@@ -5,36 +5,41 @@
 
 mod bd_seq;
 mod commanding;
+mod historical;
+mod looks;
 mod metrics;
 #[cfg(test)]
 mod tests;
 
 use std::{
-    collections::{BTreeMap, BTreeSet, HashMap},
-    sync::{Arc, Mutex, PoisonError},
+    collections::{BTreeSet, HashMap},
+    sync::{Arc, Mutex, PoisonError, atomic::Ordering},
     time::Duration,
 };
 
-use drive_fleet::{DriveHandle, Events, Freshness, Link, Received, Snapshot};
+use drive_fleet::{Events, Freshness, Received, Snapshot};
 use drive_sparkplug::{Action, BdSeq, EdgeNode, Event as Heard, Now, Settings};
-use serde_json::{Value as Json, json};
+use serde_json::Value as Json;
 use tokio::{
     sync::{mpsc, oneshot, watch},
     task::{JoinHandle, block_in_place},
     time::{Instant, MissedTickBehavior, interval, timeout},
 };
 
-use self::{bd_seq::Kept as KeptBdSeq, commanding::Commanding};
+use self::{
+    bd_seq::Kept as KeptBdSeq,
+    commanding::Commanding,
+    historical::{Counts, Historical},
+};
 use crate::{
     broker::config::{MqttConfig, SparkplugConfig},
     broker::{Arrived, Broker, Event, Goodbye, Kept, Message, Options, Qos, Subscription, Wanted, Will},
     mqtt,
 };
-use drived_config::names::Kind;
 use drived_doors::audit::Audit;
 use drived_plant::{
     counts::{Id, Samples},
-    plant::{Plant, alarms::Owner},
+    plant::Plant,
 };
 use drived_words::{failure::Failure, json::unix};
 
@@ -64,6 +69,8 @@ pub struct Sparkplug {
     broker: Broker,
     closing: watch::Sender<bool>,
     leave: oneshot::Sender<()>,
+    /// `None`: nothing of outages is told.
+    historical: Option<Arc<Counts>>,
     /// Gives its events back, so that the connection stands until its end.
     task: JoinHandle<mpsc::Receiver<Event>>,
 }
@@ -127,6 +134,11 @@ impl Sparkplug {
         for (reason, lost) in counts.lost.by_reason() {
             samples.count(Id::SparkplugLost, &[reason], lost);
         }
+        if let Some(counts) = &self.historical {
+            for (result, count) in [("told", &counts.told), ("left_out", &counts.left_out)] {
+                samples.count(Id::SparkplugHistorical, &[result], count.load(Ordering::Relaxed));
+            }
+        }
     }
 }
 
@@ -138,6 +150,8 @@ impl Prepared {
         let mut bd_seq = KeptBdSeq::open(&config.state).unwrap_or(bd_seq);
         let number = Arc::new(Mutex::new((0, BdSeq::default())));
         let (name, next) = (config.name.clone(), Arc::clone(&number));
+        // What the node hears at the least: every broker lets it ask for that once more.
+        let again = options.subscriptions.first().filter(|_| config.historical).cloned();
         let (broker, events) = Broker::start(options, move |attempt| {
             let bd_seq = without_blocking(|| bd_seq.next());
             *next.lock().unwrap_or_else(PoisonError::into_inner) = (attempt.number, bd_seq);
@@ -148,10 +162,17 @@ impl Prepared {
         let (leave, leaves) = oneshot::channel();
         let fleet_events = plant.fleet().events();
         let commanding = Commanding::new(&config, plant.clone(), audit, closes, outcomes);
+        let counts = again.as_ref().map(|_| Arc::<Counts>::default());
+        let whom = format!("sparkplug {}/{}", config.name.group, config.name.edge_node);
+        let historical = again
+            .zip(counts.clone())
+            .map(|(again, counts)| Historical::new(plant.clone(), whom, again, counts));
         let (drives, ids) = Default::default();
-        let face = Face { plant, node, broker: broker.clone(), connection: None, commanding, drives, ids };
+        let broker_too = broker.clone();
+        let face =
+            Face { plant, node, broker: broker_too, connection: None, commanding, historical, drives, ids };
         let task = tokio::spawn(face.run(events, number, told, fleet_events, leaves, interval));
-        Sparkplug { broker, closing, leave, task }
+        Sparkplug { broker, closing, leave, historical: counts, task }
     }
 }
 
@@ -163,6 +184,8 @@ struct Face {
     /// The number of the connection.
     connection: Option<u64>,
     commanding: Commanding,
+    /// `None`: nothing of outages is told.
+    historical: Option<Historical>,
     /// By their ids, which are those of the devices.
     drives: HashMap<String, Seen>,
     /// The ids of the lines and of the drives by which the metrics of the node are defined.
@@ -197,6 +220,8 @@ impl Face {
         loop {
             let deadline = self.node.deadline().map(Instant::from_std);
             let again = has_more.then(|| Instant::now() + ROOM).into_iter().chain(deadline).min();
+            let past = self.historical.as_ref().and_then(Historical::due);
+            let (mut looked_at, mut goes_on) = (None, false);
             tokio::select! {
                 event = events.recv() => match event {
                     Some(Event::Connected(attempt)) => {
@@ -205,6 +230,7 @@ impl Face {
                         if of == attempt.number {
                             self.connection = Some(attempt.number);
                             self.node.handle_connected(bd_seq);
+                            self.historical.iter_mut().for_each(Historical::begin_anew);
                             self.look();
                             self.look_at_lines();
                         }
@@ -212,6 +238,7 @@ impl Face {
                     Some(Event::Disconnected) => {
                         self.connection = None;
                         self.node.handle_disconnected();
+                        self.historical.iter_mut().for_each(Historical::begin_anew);
                     }
                     Some(Event::Message(arrived)) => self.hear(&arrived),
                     None => return events,
@@ -226,7 +253,16 @@ impl Face {
                     Received::Event(_) | Received::Missed(_) => self.look(),
                     Received::End => is_over = true,
                 },
-                _ = looks.tick() => self.look(),
+                _ = looks.tick() => {
+                    looked_at = Some(Instant::now());
+                    self.look();
+                }
+                came = came(&mut self.historical) => {
+                    if let Some(historical) = &mut self.historical {
+                        historical.take(came, &self.node);
+                    }
+                }
+                () = until(past) => goes_on = true,
                 _ = lines.tick() => self.look_at_lines(),
                 () = until(again) => {}
                 _ = &mut leaves => {
@@ -236,6 +272,37 @@ impl Face {
                 }
             }
             has_more = self.carry_out();
+            if !has_more {
+                self.note_live(looked_at);
+            }
+            if goes_on {
+                self.tell_the_past(has_more);
+            }
+        }
+    }
+
+    /// Notes that the births have been published, and everything that was seen at `looked_at`.
+    fn note_live(&mut self, looked_at: Option<Instant>) {
+        if let Some(historical) = &mut self.historical
+            && self.connection.is_some()
+            && self.node.is_told()
+        {
+            historical.born(Instant::now());
+            looked_at.into_iter().for_each(|at| historical.live(at));
+        }
+    }
+
+    /// Says what is next of the past, unless something that is so now waits.
+    fn tell_the_past(&mut self, has_more: bool) {
+        let Some(historical) = &mut self.historical else { return };
+        let is_free = !has_more && self.node.is_told() && self.broker.counts().waiting == 0;
+        match self.connection.filter(|_| is_free) {
+            None => historical.stand_by(),
+            Some(connection) => {
+                if !historical.go_on(&mut self.node, &self.broker, connection, now()) {
+                    self.part();
+                }
+            }
         }
     }
 
@@ -267,6 +334,7 @@ impl Face {
     fn part(&mut self) {
         self.connection = None;
         self.node.handle_disconnected();
+        self.historical.iter_mut().for_each(Historical::begin_anew);
         self.broker.leave(Goodbye::WithWill);
     }
 
@@ -295,97 +363,6 @@ impl Face {
         }
     }
 
-    /// Sets what the drives are like.
-    fn look(&mut self) {
-        let fleet = self.plant.fleet();
-        let mut there = BTreeSet::new();
-        for (line, _) in fleet.lines() {
-            for drive in fleet.drives_on(&line) {
-                let id = self.plant.known_as(Kind::Drive, drive.name()).id;
-                self.look_at(&line, &id, &drive);
-                there.insert(id);
-            }
-        }
-        let gone: Vec<String> = self.drives.keys().filter(|id| !there.contains(*id)).cloned().collect();
-        for id in gone {
-            self.drives.remove(&id);
-            self.node.remove_device(&id);
-        }
-    }
-
-    fn look_at(&mut self, line: &str, id: &str, drive: &DriveHandle) {
-        let (snapshot, at) = (drive.snapshot(), Instant::now());
-        if !self.drives.contains_key(id) {
-            self.drives.insert(id.to_owned(), Seen::default());
-            if let Err(error) = self.node.add_device(id, metrics::of_a_drive(), now()) {
-                tracing::error!("Sparkplug: {error}");
-            }
-        }
-        let Some(seen) = self.drives.get_mut(id) else { return };
-        let freshness = Some((snapshot.freshness(at), snapshot.measurements_freshness(at)));
-        let is_same = seen.snapshot.as_ref().is_some_and(|known| Arc::ptr_eq(known, &snapshot));
-        if is_same && seen.freshness == freshness {
-            return;
-        }
-        let mut object = json!(self.plant.view_of(line, drive));
-        object["fault"]["present"] = snapshot.present_trip().is_some().into();
-        object["last"] = seen.last.clone();
-        for (metric, reading) in metrics::read_drive(&object, unix(at)) {
-            // A device that was refused has no metrics; that has been said.
-            let _ = self.node.set_device(id, metric, reading);
-        }
-        self.node.set_present(id, snapshot.link == Link::Connected);
-        (seen.snapshot, seen.freshness) = (Some(snapshot), freshness);
-    }
-
-    /// Sets what the daemon, its lines and all alarms are like. Lines and drives that have come or gone are told by births.
-    fn look_at_lines(&mut self) {
-        let (lines, at) = (self.plant.lines(), now());
-        let drives = self.plant.fleet().drives();
-        let id = |kind, name: &str| self.plant.known_as(kind, name).id;
-        let ids: (BTreeSet<String>, BTreeSet<String>) = (
-            lines.iter().map(|line| line.known_as.id.clone()).collect(),
-            drives.iter().map(|drive| id(Kind::Drive, drive.name())).collect(),
-        );
-        if ids != self.ids {
-            let owners = owners(&ids);
-            match self.node.define(metrics::of_the_node(&ids.0, &owners), at) {
-                Ok(()) => self.ids = ids,
-                Err(error) => tracing::error!("Sparkplug: {error}"),
-            }
-        }
-        for line in &lines {
-            for (metric, reading) in metrics::read_line(&json!(line), at.unix_ms) {
-                let _ = self.node.set_node(&metric, reading);
-            }
-        }
-        let version = json!({ "version": env!("CARGO_PKG_VERSION") });
-        for (metric, reading) in metrics::read_daemon(&version, at.unix_ms) {
-            let _ = self.node.set_node(metric, reading);
-        }
-        self.look_at_alarms();
-    }
-
-    /// Sets what the alarms of everybody are like.
-    fn look_at_alarms(&mut self) {
-        let at = now();
-        let id = |kind, name: String| self.plant.known_as(kind, &name).id;
-        let by_id = |owner| match owner {
-            Owner::Program => Owner::Program,
-            Owner::Line(name) => Owner::Line(id(Kind::Line, name)),
-            Owner::Drive(name) => Owner::Drive(id(Kind::Drive, name)),
-        };
-        let together = self.plant.alarms().together();
-        let mut alarms: BTreeMap<Owner, _> =
-            together.into_iter().map(|(owner, own)| (by_id(owner), own)).collect();
-        for owner in owners(&self.ids) {
-            let own = alarms.remove(&owner).unwrap_or_default();
-            for (metric, reading) in metrics::read_alarms(&owner, &own, at.unix_ms) {
-                let _ = self.node.set_node(&metric, reading);
-            }
-        }
-    }
-
     /// Says what was done with alarms by what a host has written.
     fn tell_done(&mut self, done: &Json) {
         for (metric, reading) in metrics::read_done(done, now().unix_ms) {
@@ -396,10 +373,12 @@ impl Face {
     }
 }
 
-/// Who can have alarms, of the lines and drives of these ids.
-fn owners((lines, drives): &(BTreeSet<String>, BTreeSet<String>)) -> Vec<Owner> {
-    let lines = lines.iter().cloned().map(Owner::Line);
-    std::iter::once(Owner::Program).chain(lines).chain(drives.iter().cloned().map(Owner::Drive)).collect()
+/// Waits for what comes to who tells the past, or for ever.
+async fn came(historical: &mut Option<Historical>) -> historical::Came {
+    match historical {
+        Some(historical) => historical.came().await,
+        None => std::future::pending().await,
+    }
 }
 
 /// Waits until a time, or for ever.

@@ -2,7 +2,10 @@
 
 use drive_fleet::DriveSettings;
 use drive_sparkplug::{Definition, Id, Metric, NodeName, Payload, Quality, Raw, Reading};
+use serde_json::json;
 use tokio::time::sleep;
+
+mod historical;
 
 use super::*;
 use crate::{
@@ -28,6 +31,7 @@ fn config(name: &str) -> SparkplugConfig {
         commands: Some(Role::Operate),
         lifetime: Duration::from_secs(1),
         rebirth_pause: Duration::from_secs(5),
+        historical: false,
         state,
     }
 }
@@ -246,6 +250,22 @@ async fn what_is_unclear_moves_no_motor_and_the_key_is_named() {
         assert_eq!(last(&bench)[2], "malformed", "{text}");
         assert!(!bench.plant.machines[0].observe().running, "{text}");
     }
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_asks_afterwards_finds_a_command_that_was_refused() {
+    let bench = Bench::of(1, SparkplugConfig { commands: Some(Role::Stop), ..config("refused") }).await;
+    for id in ["a", "b"] {
+        let start = format!(r#"{{"id": "{id}", "action": "start"}}"#);
+        bench.write("pump 1", "Control/Command", Raw::String(start));
+        sleep(Duration::from_secs(3)).await;
+    }
+    let events = bench.plant.plant.recent().into_iter().filter_map(|recent| recent.what.event());
+    let told: Vec<String> = events.map(|event| event.text).filter(|text| text.contains("refused")).collect();
+    let [once] = &told[..] else { panic!("{told:?}") };
+    assert!(once.starts_with("pump 1: start by sparkplug from sparkplug plant: refused: "), "{once}");
+    let last = bench.plant.plant.last_command("pump 1").unwrap();
+    assert_eq!((last.id.as_deref(), last.reason.as_deref()), (Some("b"), Some("no_right")));
 }
 
 #[tokio::test(start_paused = true)]

@@ -3,6 +3,7 @@
 //! Moments are milliseconds since 1970 by the wall's clock as it stood then. Where that clock was set back, what was told twice of one time is
 //! given in the order of the daemon's own clock.
 
+mod as_read;
 mod days;
 mod frames;
 mod lines;
@@ -16,6 +17,7 @@ use std::{collections::BTreeSet, path::Path};
 
 use rusqlite::{Connection, OptionalExtension as _, params};
 
+pub(crate) use self::as_read::{Page, Read, as_read};
 pub use self::{
     days::{Ran, days, ran},
     frames::{AFTER_MS, BEFORE_MS, Frame, Heard, capture, frames},
@@ -169,7 +171,7 @@ pub fn told_in(
 ) -> Result<Vec<(i64, Piece)>, StoreError> {
     let mut all: Vec<(i64, Piece)> = Vec::new();
     for source in Set::ALL.into_iter().filter_map(|set| source(connection, drive, set).transpose()) {
-        let source = source?;
+        let (source, mut of_source) = (source?, Vec::new());
         let mut find = connection.prepare_cached(
             "SELECT segment, start_ms, end_ms, data FROM block
              WHERE source = ?1 AND quantity = ?2 AND start_ms BETWEEN ?3 AND ?4 AND end_ms >= ?5
@@ -181,15 +183,19 @@ pub fn told_in(
         )?;
         for row in rows {
             let (segment, start, end, data) = row?;
-            all.push((segment, Piece { start, end, points: unpack(start, &data)? }));
+            of_source.push((segment, Piece { start, end, points: unpack(start, &data)? }));
         }
         for (segment, start, end, data) in chunks(connection, source, from, to)? {
-            all.push((segment, piece_of(quantity, start, end, &data)?));
+            of_source.push((segment, piece_of(quantity, start, end, &data)?));
         }
         if quantity.is_kept_by_changes() {
             // What a block begins with is in it.
             let until = oldest_block(connection, source, quantity)?.map_or(i64::MAX, |oldest| oldest - 1);
-            all.extend(changes(connection, source, quantity, from, to.min(until))?);
+            of_source.extend(changes(connection, source, quantity, from, to.min(until))?);
+        }
+        // The other one says nothing of it, also not that it is not known.
+        if of_source.iter().any(|(_, piece)| !piece.points.is_empty()) {
+            all.extend(of_source);
         }
     }
     // A quantity is of one source; what is in blocks is older than what is in chunks, within each segment.

@@ -1,5 +1,6 @@
 //! The file: opened, checked, locked against a second daemon, and put aside where it is damaged.
 
+mod outages;
 mod place;
 pub mod schema;
 
@@ -14,6 +15,7 @@ use rusqlite::{Connection, ErrorCode, OpenFlags};
 
 use drived_config::kept::Kept;
 
+pub(crate) use self::outages::{outages, write as write_outages};
 pub use self::place::Place;
 
 /// What stands behind the name of the file in that of the file that says who writes it.

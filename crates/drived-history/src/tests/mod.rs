@@ -4,6 +4,7 @@ mod asked;
 mod captures;
 mod clock;
 mod faults;
+mod untold;
 mod week;
 
 use std::sync::Arc;

@@ -15,10 +15,11 @@ use super::{
 };
 use crate::{
     chunk::{Chunk, WHOLE},
+    outages::Changes,
     quantity::Set,
     read::SOURCE_BITS,
     record::{LineMinute, Moment, Record, Setting},
-    store::{Place, StoreError},
+    store::{self, Place, StoreError},
 };
 
 /// Values are written after this time; a kill or a power cut loses no more.
@@ -72,6 +73,8 @@ pub struct Archive {
     /// What captures have heard, packed.
     captures: Vec<Kept>,
     sent: BTreeMap<String, Place>,
+    outages: BTreeMap<String, Changes>,
+    outages_at_once: bool,
     /// For how long daemons had run with this file before this run began.
     lived_before_ms: i64,
     flushed_at: i64,
@@ -94,6 +97,8 @@ impl Archive {
             settings: Vec::new(),
             captures: Vec::new(),
             sent: BTreeMap::new(),
+            outages: BTreeMap::new(),
+            outages_at_once: false,
             lived_before_ms: 0,
             flushed_at: now.steady_ms,
             lost: Lost::default(),
@@ -126,6 +131,10 @@ impl Archive {
             }
         }
         self.sent.extend(batch.sent);
+        for (whom, changes) in batch.outages {
+            self.outages.entry(whom).or_default().extend(changes);
+        }
+        self.outages_at_once |= batch.outages_at_once;
     }
 
     /// For how long daemons have run with this file, this one among them.
@@ -188,6 +197,12 @@ impl Archive {
     #[must_use]
     pub fn is_due(&self, now: Moment) -> bool {
         now.steady_ms - self.flushed_at >= FLUSHED_EVERY_MS || self.open_points >= FLUSHED_AT
+    }
+
+    /// When what was shown was closed last: once it is written, everything up to then is.
+    #[must_use]
+    pub const fn flushed_at(&self) -> i64 {
+        self.flushed_at
     }
 
     /// Whether something waits that is not to wait.
@@ -283,6 +298,8 @@ impl Archive {
     /// They cannot be written.
     pub fn write_values(&mut self, connection: &mut Connection) -> Result<(), StoreError> {
         let Some(run) = self.run else { return Ok(()) };
+        // What was told as it was read is written when that is: what a kill takes of both belongs together.
+        let has_outages = !self.outages.is_empty() && (self.outages_at_once || !self.closed.is_empty());
         while let Some(flush) = self.closed.front_mut() {
             let transaction = connection.transaction()?;
             let segment = match flush.clock.segment {
@@ -325,6 +342,11 @@ impl Archive {
             transaction.commit()?;
             self.sent.clear();
         }
+        if has_outages {
+            store::write_outages(connection, run, &self.outages)?;
+            self.outages.clear();
+            self.outages_at_once = false;
+        }
         Ok(())
     }
 
@@ -334,6 +356,7 @@ impl Archive {
     /// It cannot be written.
     pub fn end_run(&mut self, connection: &mut Connection, now: Moment) -> Result<(), StoreError> {
         self.close(now);
+        self.outages_at_once = true;
         self.record(Record::of_history(now, "ended", "the daemon ended as it should"));
         self.write_values(connection)?;
         self.write_records(connection, now)?;

@@ -2,11 +2,15 @@
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Condvar, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicI64, Ordering},
+    },
     time::Duration,
 };
 
 use crate::{
+    outages::Changes,
     quantity::Set,
     record::{LineFrames, LineMinute, Record, Setting},
     store::Place,
@@ -40,6 +44,10 @@ pub struct Batch {
     pub frames: Vec<LineFrames>,
     /// How far was sent on, by where to.
     pub sent: BTreeMap<String, Place>,
+    /// What was not told to somebody, by whom,
+    pub outages: BTreeMap<String, Changes>,
+    /// and whether it is to be written before values are.
+    pub outages_at_once: bool,
     pub lost: Lost,
     /// How often somebody has asked for what waits to be written, since the beginning.
     pub asked: u64,
@@ -70,13 +78,27 @@ impl Lost {
 #[derive(Debug, Clone, Default)]
 pub struct Inbox(Arc<Inner>);
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Inner {
     waiting: Mutex<Batch>,
     rings: Condvar,
     /// Which of those who asked have what they asked for.
     written: Mutex<u64>,
     is_written: Condvar,
+    /// Up to when what was read is in the file, by the daemon's own clock.
+    written_until: AtomicI64,
+}
+
+impl Default for Inner {
+    fn default() -> Self {
+        Self {
+            waiting: Mutex::default(),
+            rings: Condvar::new(),
+            written: Mutex::default(),
+            is_written: Condvar::new(),
+            written_until: AtomicI64::new(i64::MIN),
+        }
+    }
 }
 
 /// It was not taken, and is counted as lost.
@@ -139,6 +161,24 @@ impl Inbox {
     /// Takes how far was sent on.
     pub fn sent(&self, target: String, place: Place) {
         self.lock().sent.insert(target, place);
+    }
+
+    /// Takes what has become of the outages of somebody. What is not urgent is written with the next values: it speaks of those.
+    pub fn outages(&self, whom: &str, changes: Changes, is_urgent: bool) {
+        let mut waiting = self.lock();
+        waiting.outages.entry(whom.to_owned()).or_default().extend(changes);
+        waiting.outages_at_once |= is_urgent;
+    }
+
+    /// Up to when what was read is in the file, by the daemon's own clock; `None`: this run does not stand there yet.
+    #[must_use]
+    pub fn written_until(&self) -> Option<i64> {
+        Some(self.0.written_until.load(Ordering::Acquire)).filter(|at| *at > i64::MIN)
+    }
+
+    /// What was read up to a moment is in the file.
+    pub fn has_written_until(&self, at_ms: i64) {
+        self.0.written_until.store(at_ms, Ordering::Release);
     }
 
     /// Has written what waits, and waits for that, at the most for this long: values wait for up to a minute, and who asks is not to.

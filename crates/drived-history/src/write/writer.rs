@@ -104,6 +104,9 @@ impl<C: Fn() -> Moment> Work<C> {
             let may_try = self.tried.is_none_or(|tried| tried.elapsed() >= TRIED_AGAIN) || is_end;
             if may_try && !self.is_given_up {
                 let worked = self.work(now, is_end);
+                if worked.is_ok() {
+                    self.writer.inbox.has_written_until(self.archive.flushed_at());
+                }
                 self.tell(worked);
             }
             if asked != self.asked {

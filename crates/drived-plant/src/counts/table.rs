@@ -176,6 +176,8 @@ metrics! {
     SparkplugArrived: Counter, "drived_sparkplug_arrived_messages_total", [], "Messages for the edge node that were looked at.";
     SparkplugLost: Counter, "drived_sparkplug_dropped_messages_total", ["reason"],
         "Messages of the edge node, or for it, that were lost; reasons as for MQTT.";
+    SparkplugHistorical: Counter, "drived_sparkplug_historical_values_total", ["result"],
+        "Values of outages by what became of them: told, or left_out, for their drive or its metric is not there any more.";
     WebhookWaiting: Gauge, "drived_webhook_queue_messages", ["receiver"], "Messages that wait for a receiver of alarms.";
     WebhookTaken: Counter, "drived_webhook_sent_messages_total", ["receiver"], "Messages that the receiver has taken.";
     WebhookFailed: Counter, "drived_webhook_failed_attempts_total", ["receiver", "reason"],

@@ -12,6 +12,7 @@ pub mod revisions;
 pub mod tally;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
+pub mod untold;
 mod usage;
 pub mod views;
 mod watching;
@@ -83,6 +84,7 @@ struct Inner {
     alarms: alarms::Desk,
     names: OnceLock<Names>,
     past: RwLock<Option<Arc<dyn past::Past>>>,
+    untold: RwLock<Option<Arc<dyn untold::Untold>>>,
 }
 
 impl Plant {
@@ -113,6 +115,7 @@ impl Plant {
             alarms: alarms::Desk::new(kept),
             names: OnceLock::new(),
             past: RwLock::default(),
+            untold: RwLock::default(),
         });
         watching::start(&inner);
         history::start(&inner);

@@ -28,24 +28,43 @@ impl Mosquitto {
         let config = super::support::path(&format!("{name}-mosquitto.conf"));
         std::fs::write(&config, format!("listener {port} 127.0.0.1\nallow_anonymous true\n"))
             .expect("the directory can be written");
+        match Self::spawn(&config, port) {
+            Ok(child) => Some(Self { child, port, config }),
+            Err(error) => {
+                let _ = drive_testing::peers::is_there(false, &format!("mosquitto ({error})"));
+                None
+            }
+        }
+    }
+
+    /// Kills it.
+    pub(crate) fn end(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+
+    /// Begins again where it was, and knows nothing of before.
+    pub(crate) fn begin(&mut self) {
+        self.child = Self::spawn(&self.config, self.port).expect("it has run before");
+    }
+
+    /// It listens when this returns.
+    fn spawn(config: &std::path::Path, port: u16) -> std::io::Result<Child> {
         let program = if std::path::Path::new("/usr/sbin/mosquitto").exists() {
             "/usr/sbin/mosquitto"
         } else {
             "mosquitto"
         };
-        let started =
-            Command::new(program).arg("-c").arg(&config).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
-        let child = match started {
-            Ok(child) => child,
-            Err(error) => {
-                let _ = drive_testing::peers::is_there(false, &format!("mosquitto ({error})"));
-                return None;
-            }
-        };
+        let child = Command::new(program)
+            .arg("-c")
+            .arg(config)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()?;
         while TcpStream::connect(("127.0.0.1", port)).is_err() {
             thread::yield_now();
         }
-        Some(Self { child, port, config })
+        Ok(child)
     }
 
     /// Publishes bytes as somebody else's client does.
@@ -64,8 +83,7 @@ impl Mosquitto {
 
 impl Drop for Mosquitto {
     fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.end();
         let _ = std::fs::remove_file(&self.config);
     }
 }

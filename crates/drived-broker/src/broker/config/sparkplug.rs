@@ -30,6 +30,8 @@ pub struct SparkplugConfig {
     /// How old a command may be that does not say so itself.
     pub lifetime: Duration,
     pub rebirth_pause: Duration,
+    /// Whether what the history kept while nobody was told is told later.
+    pub historical: bool,
     /// The file of the number that joins deaths to births.
     pub state: PathBuf,
 }
@@ -52,6 +54,8 @@ pub struct SparkplugEntry {
     commands: Option<Parsed<Commands>>,
     lifetime: Option<Spanned<Parsed<Time>>>,
     rebirth_pause: Option<Parsed<Time>>,
+    #[serde(default)]
+    historical: bool,
     state: Option<PathBuf>,
 }
 
@@ -106,6 +110,7 @@ impl SparkplugConfig {
             commands: entry.commands.and_then(|commands| commands.0.0),
             lifetime,
             rebirth_pause: entry.rebirth_pause.map_or(REBIRTH_PAUSE, |time| time.0.0),
+            historical: entry.historical,
             state,
         })
     }

@@ -1,4 +1,5 @@
-//! What was refused before the plant heard of it, told as something that happened: nobody finds it else who asks afterwards.
+//! What was refused before the plant heard of it, told as something that happened, at whichever broker: nobody finds it else who asks
+//! afterwards.
 
 use std::{
     collections::VecDeque,
@@ -10,7 +11,7 @@ use drived_plant::plant::views::NoticeView;
 use serde_json::json;
 use tokio::time::Instant;
 
-use crate::desk::Refused;
+use super::Refused;
 
 /// The same is told once in this time: who sends it again and again fills no history with it,
 const ONCE_IN: Duration = Duration::from_secs(60);
@@ -19,9 +20,9 @@ const TOLD: usize = 20;
 
 /// What was told of it lately.
 #[derive(Debug, Default)]
-pub(super) struct Refusals(Mutex<VecDeque<(Instant, String)>>);
+pub(super) struct Lately(Mutex<VecDeque<(Instant, String)>>);
 
-impl Refusals {
+impl Lately {
     /// What is to be told of a command of a drive that does nothing; `None`: it was told a moment ago.
     pub(super) fn of(&self, drive: &str, refused: &Refused, now: Instant) -> Option<NoticeView> {
         let Refused { action, outcome, reason, text, caller, origin, .. } = refused;
@@ -59,10 +60,10 @@ mod tests {
             origin: "mqtt".to_owned(),
             time_unix_ms: 0,
         };
-        let (refusals, began) = (Refusals::default(), Instant::now());
+        let (lately, began) = (Lately::default(), Instant::now());
         let told = |caller: &str, second: u64| {
             let now = began + Duration::from_secs(second);
-            refusals.of("pump 1", &refused(caller), now).map(|told| told.text)
+            lately.of("pump 1", &refused(caller), now).map(|told| told.text)
         };
         let text = "pump 1: start by eye from mqtt: refused: it has no right";
         assert_eq!(told("eye", 0).as_deref(), Some(text));
