@@ -15,7 +15,7 @@ use drived_plant::plant::{
 use rusqlite::Connection;
 
 use crate::{
-    listen::Clocks,
+    clocks::Clocks,
     outages::{END, Outage, Outages},
     read::{self, History, Page, Read},
     store,

@@ -14,7 +14,7 @@ use tokio::time::Instant;
 
 use super::{BEGIN_MS, Pump};
 use crate::{
-    listen::Clocks,
+    clocks::Clocks,
     quantity::{Quantity, Set},
     read::{History, pieces},
     record::Moment,
