@@ -30,7 +30,7 @@ const OTHER_WORD: Refusal = Refusal::Overridden {
     remedy: "see who else writes to this drive",
 };
 const HELD_BACK: Refusal = Refusal::Overridden {
-    by: "a stop at the drive, or an input that holds it",
+    by: "something that the drive does not tell, such as a stop at it, an input, another master or its supply,",
     remedy: "stop it, see what holds it, and start it again if it is to run",
 };
 

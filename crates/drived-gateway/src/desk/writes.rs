@@ -119,6 +119,12 @@ impl Desk {
         Caller::new(self.config.name.clone(), format!("modbus {peer}"), self.config.rights)
     }
 
+    /// This program itself, upon the silence of a client.
+    fn policy(&self, peer: IpAddr) -> Caller {
+        let who = format!("this program, by on_client_silence of {}", self.config.name);
+        Caller::new(who, format!("modbus {peer}"), self.config.rights)
+    }
+
     /// What each word of a write asks, as far as that needs no exchange.
     fn intents_without_reading(
         &self,
@@ -485,7 +491,8 @@ impl Desk {
                 });
                 self.plant.revisions().push(Subject::Event, &event);
                 if self.config.stops_when_silent {
-                    let caller = self.caller(peer);
+                    // Nobody has asked for it: it is this program's policy.
+                    let caller = self.policy(peer);
                     // Whoever waits for it, the fleet repeats it until it is confirmed.
                     let _ = self.stop(&caller, &drive, StopMode::Ramp, Instant::now()).await;
                 }

@@ -38,6 +38,12 @@ pub(super) fn before(
 ) -> Result<Vec<Sentence>, StoreError> {
     let states = states(connection, facts, moment - MINUTE_MS, moment + TOLD_BEHIND_MS)?;
     let shown = about.and_then(|about| reading_of(facts, about, &states));
+    // What passed its limit was read with what is told, and is no value of before.
+    let limit = about.filter(|about| about.what == "limit").map(|_| moment - TOLD_BEHIND_MS);
+    let shown = match (shown, limit) {
+        (Some(shown), Some(limit)) => Some(shown.min(limit)),
+        (shown, limit) => shown.or(limit),
+    };
     let at = shown.unwrap_or(moment) - 1;
     let spans = known_spans(&states);
     let known = spans.iter().rev().find(|(start, _)| *start <= at).map(|(_, end)| (*end).min(at));
@@ -48,7 +54,13 @@ pub(super) fn before(
         None => Vec::new(),
     };
     let (Some(seen), false) = (seen, values.is_empty()) else {
-        return Ok(vec![Sentence::of(Certainty::NotKnown, "how it was a moment before is not known")]);
+        let text = match facts.ends_soon_after(moment) {
+            Some(_) => {
+                "how it was a moment before is not known, or not written yet: what is read is written within a minute"
+            }
+            None => "how it was a moment before is not known",
+        };
+        return Ok(vec![Sentence::of(Certainty::NotKnown, text)]);
     };
     let values = values.join(", ");
     // When it was read that it was so nobody has kept, where every poll showed the same: no moment is told for it.

@@ -7,7 +7,7 @@ use drived_plant::plant::past::{
 
 use super::{
     super::facts::Facts,
-    evidence::{BESIDE_MS, SILENT_MS, asked_before},
+    evidence::{BESIDE_MS, SILENT_MS, asked_before, without_outcome},
 };
 
 /// What was asked for here; of a stop, what it was that ended it.
@@ -31,7 +31,8 @@ pub(super) fn of_unconfirmed_stop(facts: &Facts, about: &RecordView) -> Vec<Sent
     let mut said = Vec::new();
     if let Some(asked) = asked_before(facts, about, &["stop"]) {
         said.push(
-            Sentence::of(Seen, format!("the stop was asked for here: {}", asked.text)).at(asked.time_unix_ms),
+            Sentence::of(Seen, format!("the stop was asked for here: {}", without_outcome(&asked.text)))
+                .at(asked.time_unix_ms),
         );
     }
     said.push(Sentence::of(Seen, format!("the drive did not show that it had stopped: {}", about.text)));

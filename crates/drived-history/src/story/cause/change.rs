@@ -8,12 +8,18 @@ use drived_plant::plant::past::{
 use super::{
     super::{
         body::{Cause, body},
-        facts::Facts,
+        facts::{Facts, lasting},
     },
     drive::withdrew,
-    evidence::{BESIDE_MS, OBEYED_MS, asked_before, found_within, lost_before, nobody_asked, seen_beside},
+    evidence::{
+        BESIDE_MS, OBEYED_MS, asked_before, found_within, lost_before, nobody_asked, seen_beside,
+        without_outcome,
+    },
     word::ONE_READING_MS,
 };
+
+/// No motor that runs is brought down by its ramp within this time.
+const NO_RAMP_MS: i64 = 300;
 
 /// What a drive shows otherwise than before: whose doing it was.
 pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
@@ -29,11 +35,27 @@ pub(super) fn of_change(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
 fn asked_for(facts: &Facts, about: &RecordView, commander: &str, door: Option<String>) -> Vec<Sentence> {
     let door = door.map(|door| format!(" through {door}")).unwrap_or_default();
     let mut said = vec![Sentence::of(Seen, format!("{commander} asked for it{door}"))];
-    said.extend(
-        asked_before(facts, about, &["start", "stop", "release", "reset"])
-            .map(|asked| Sentence::of(Seen, asked.text.clone()).at(asked.time_unix_ms)),
-    );
+    if let Some(asked) = asked_before(facts, about, &["start", "stop", "release", "reset"]) {
+        said.push(Sentence::of(Seen, asked.text.clone()).at(asked.time_unix_ms));
+        said.extend(is_too_quick(about, asked).then(|| {
+            let text = format!(
+                "its output was off when it was read {} behind that, which no ramp does: what cut it, such as an input or a key, may have come first",
+                lasting(about.time_unix_ms - asked.time_unix_ms)
+            );
+            Sentence::of(NotKnown, text)
+        }));
+    }
     said
+}
+
+/// Whether a motor that ran stands without an output sooner than its ramp could have brought it down.
+fn is_too_quick(about: &RecordView, asked: &RecordView) -> bool {
+    let changed = body(about);
+    let is_off = !matches!(changed.to.as_deref(), Some("stopping" | "quick_stop" | "running") | None);
+    asked.text.starts_with("ramp stop")
+        && changed.from.as_deref() == Some("running")
+        && is_off
+        && about.time_unix_ms - asked.time_unix_ms < NO_RAMP_MS
 }
 
 /// The program did it by itself.
@@ -74,6 +96,13 @@ fn by_the_drive(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     if let Some(key) = stop_key(facts, at).filter(|_| !begins_to_run) {
         said.push(Sentence::of(Said, format!("the drive says so: {}", key.text)).at(key.time_unix_ms));
         said.push(Sentence::of(NotKnown, "who pressed it cannot be seen from the line"));
+        said.extend(asked_before(facts, about, &["stop", "release"]).map(|asked| {
+            let text = format!(
+                "a stop was asked for here too: {}; what that had done when the key was pressed is not known",
+                without_outcome(&asked.text)
+            );
+            Sentence::of(NotKnown, text).at(asked.time_unix_ms)
+        }));
         return said;
     }
     let shown = shown_before(facts, about).filter(|_| !begins_to_run);

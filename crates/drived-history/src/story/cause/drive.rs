@@ -9,11 +9,12 @@ use drived_plant::plant::past::{
 
 use super::{
     super::{
-        body::Cause,
+        body::{Cause, body},
         facts::{Facts, begins, lasting},
     },
-    back::SILENT_TOGETHER_MS,
+    back::{Back, SILENT_TOGETHER_MS, Shows},
     evidence::{BESIDE_MS, inputs_stayed, loss_before, lost_before, names, nobody_asked, seen_beside},
+    silence::stood_still,
     word::{Went, how_it_went, of_reference},
 };
 
@@ -27,7 +28,7 @@ pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, op
             all.push(supply);
             all.extend(silent_with(facts, about.time_unix_ms));
             said = Sentence::of(Said, gone);
-            open = "what took its supply away cannot be seen from the line";
+            open = "whether its supply was away, and what took it away, cannot be seen from the line for certain";
         }
         Some(Went::ByWord(word)) => {
             by_word = Some(word);
@@ -54,9 +55,13 @@ pub(super) fn at_the_drive(facts: &Facts, about: &RecordView, said: Sentence, op
 /// Others of which nothing was heard in the same time: what they share may be what was away.
 pub(super) fn silent_with(facts: &Facts, at: i64) -> Vec<Sentence> {
     let Some(start) = loss_before(facts, at).map(|(lost, _)| begins(lost)) else { return Vec::new() };
-    let silent = facts.elsewhere("lost", start, BESIDE_MS);
-    let silent: Vec<&RecordView> =
-        silent.into_iter().filter(|other| (begins(other) - start).abs() <= SILENT_TOGETHER_MS).collect();
+    let mut silent = facts.elsewhere("lost", start, BESIDE_MS);
+    silent.retain(|other| {
+        // Who was not asked was not silent.
+        (begins(other) - start).abs() <= SILENT_TOGETHER_MS
+            && stood_still(facts, begins(other), other.time_unix_ms).is_none()
+    });
+    let were_fed = silent.iter().any(|other| matches!(Back::behind(facts, other).shows, Shows::Fed(_)));
     if silent.is_empty() {
         return Vec::new();
     }
@@ -65,10 +70,10 @@ pub(super) fn silent_with(facts: &Facts, at: i64) -> Vec<Sentence> {
         true => "on other lines too",
         false => "of its line",
     };
-    vec![
-        Sentence::of(Seen, format!("{} fell silent with it, {place}", names(&silent))),
-        Sentence::of(Likely, "what feeds them all was away, such as the mains"),
-    ]
+    let with_it = Sentence::of(Seen, format!("{} fell silent with it, {place}", names(&silent)));
+    let fed = Sentence::of(Likely, "what feeds them all was away, such as the mains");
+    let shared = (!were_fed).then_some(fed);
+    [with_it].into_iter().chain(shared).collect()
 }
 
 /// What the program did upon it by itself: that may be what brought the motor to a standstill.
@@ -93,7 +98,11 @@ pub(super) fn withdrew(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
             && (0..=BESIDE_MS / 6).contains(&(found.time_unix_ms - about.time_unix_ms))
             && found.number >= about.number
     });
-    let mut own = own.filter_map(|ended| Some((ended, facts.was_ending(ended)?)));
+    let has_acted = |ended: &&RecordView| match body(ended).cause {
+        Some(Cause::Policy { policy }) => !facts.found_nothing_to_do(ended, &policy),
+        _ => true,
+    };
+    let mut own = own.filter(has_acted).filter_map(|ended| Some((ended, facts.was_ending(ended)?)));
     let Some((ended, upon)) = own.next() else { return Vec::new() };
     let text = "upon this, this program withdrew its run command by itself, and its output was falling by then: whether that or what had begun before it ended the run is not known";
     let upon = (upon.number != about.number).then(|| {

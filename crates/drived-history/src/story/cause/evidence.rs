@@ -64,6 +64,13 @@ fn was_sent(facts: &Facts, found: &RecordView) -> bool {
     !matches!(outcome.as_deref(), Some("refused" | "expired" | "superseded" | "nothing"))
 }
 
+/// A command without what became of it, which was told later than what it is told with.
+pub(super) fn without_outcome(text: &str) -> &str {
+    const OUTCOMES: [&str; 6] =
+        [": confirmed", ": refused", ": not confirmed", ": unknown", ": expired", ": superseded"];
+    OUTCOMES.iter().find_map(|outcome| text.split_once(outcome)).map_or(text, |(asked, _)| asked)
+}
+
 /// What was asked for before a trip was seen: whether it was before the trip is known only where the drive was seen between them.
 pub(super) fn in_order(facts: &Facts, about: &RecordView, asked: &RecordView) -> Sentence {
     let between = |found: &RecordView| {
@@ -90,7 +97,8 @@ pub(super) fn in_order(facts: &Facts, about: &RecordView, asked: &RecordView) ->
 
 /// Something that was found, and within which time it happened.
 pub(super) fn found_within(facts: &Facts, at: i64, what: &str) -> Sentence {
-    match facts.gap_before(at) {
+    let lost = loss_before(facts, at).map_or(i64::MIN, |(lost, _)| begins(lost));
+    match facts.gap_before(at).map(|(start, end)| (start.max(lost.min(end)), end)) {
         Some((start, end)) => Sentence::of(
             NotKnown,
             format!(

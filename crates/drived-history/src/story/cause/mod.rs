@@ -100,7 +100,7 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
                 Some(control) if control != "bus" => {
                     "whether another master, an input or a key did it cannot be seen from the line"
                 }
-                _ => "who or what did it at the drive cannot be seen from the line",
+                _ => "who or what did it cannot be seen from the line",
             },
         ),
         "other_family" | "identity_changed" => {
@@ -124,11 +124,11 @@ pub(super) fn causes(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
 pub(super) fn headline(facts: &Facts, about: &RecordView) -> Sentence {
     let is_open = about.what == "command_overridden" && about.text.contains("power cycle");
     if is_block_of_supply(facts, about) {
-        let text = "its run ended with its supply, which was away";
+        let text = "its run ended, likely with its supply";
         return Sentence::of(Likely, text).at(about.time_unix_ms);
     }
     let (certainty, text) = match is_open.then(|| how_it_went(facts, about)) {
-        Some(Went::Unfed(_)) => (Likely, "its run command went with its supply, which was away".to_owned()),
+        Some(Went::Unfed(_)) => (Likely, "its run command went, likely with its supply".to_owned()),
         Some(Went::ByWord(_)) => {
             (Likely, "its run command went by another word that was written to it".to_owned())
         }

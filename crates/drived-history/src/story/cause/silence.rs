@@ -235,7 +235,7 @@ fn on_its_line(with_it: &[&RecordView], answered: &[&str], back: Back) -> Vec<Se
 }
 
 /// That this program itself stood still for most of a silence.
-fn stood_still(facts: &Facts, from: i64, to: i64) -> Option<&RecordView> {
+pub(super) fn stood_still(facts: &Facts, from: i64, to: i64) -> Option<&RecordView> {
     facts.records.iter().find(|found| {
         let since = body(found).since_unix_ms.unwrap_or(found.time_unix_ms);
         let shared = found.time_unix_ms.min(to) - since.max(from);

@@ -8,7 +8,7 @@ use drived_plant::plant::past::{
 use super::{
     super::{
         body::body,
-        facts::{Facts, lasting},
+        facts::{Facts, UNLISTED, lasting},
     },
     evidence::{
         SILENT_MS, TOGETHER_MS, asked_before, found_within, in_order, inputs_changed, is_of_supply,
@@ -31,6 +31,13 @@ pub(super) fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         (by_watchdog || fault.by_watchdog, is_found || fault.found)
     });
     let mut said = vec![match reason(&facts.in_words(about)) {
+        Some(_) if facts.in_words(about).contains(UNLISTED) => Sentence::of(
+            Said,
+            format!(
+                "the drive says by what code it tripped, and not what that means: {}",
+                facts.in_words(about)
+            ),
+        ),
         Some(_) => {
             Sentence::of(Said, format!("the drive itself says what it tripped by: {}", facts.in_words(about)))
         }
@@ -64,7 +71,7 @@ pub(super) fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
         said.push(Sentence::of(Seen, format!("before it, its {}", departed.text)).at(departed.time_unix_ms));
     }
     if !by_watchdog {
-        let text = "what brought it there (load, mains, wiring, setting) the line does not show; the values before it are below";
+        let text = "what brought it there (load, mains, wiring, setting) the line does not show";
         said.push(Sentence::of(NotKnown, text));
     }
     said

@@ -33,7 +33,7 @@ pub(super) fn how_it_went(facts: &Facts, gone: &RecordView) -> Went {
     let shown = found(facts, gone).filter(|_| is_open).map(body).unwrap_or_default();
     match (shown.reference_before_hz, shown.reference_hz) {
         (Some(_), Some(0.0)) => {
-            let text = "its supply was away: its run command and its reference are both 0 when a drive is fed again, and who only stops it leaves its reference as it was";
+            let text = "its supply was away: its run command and its reference are both 0 when a drive is fed again; another master that writes both as 0 leaves it so too";
             return Went::Unfed(Sentence::of(Likely, text).at(at));
         }
         (Some(before), Some(now)) if before == now => {

@@ -10,6 +10,8 @@ use super::{
     Facts, SEEN_AGAIN_MS,
 };
 
+/// What is told of a code that a manual does not list (drive-core).
+pub(in crate::story) const UNLISTED: &str = "a code that the manual does not list";
 /// What is told of one reading is recorded within this time.
 const SAME_READING_MS: i64 = 150;
 
@@ -61,6 +63,9 @@ impl Facts {
     /// can do nothing of the kind, or that acted long before, did not do it.
     pub(in crate::story) fn cause_of(&self, found: &RecordView) -> Option<Cause> {
         let Body { cause, from, .. } = body(found);
+        if self.stop_key_with(found).is_some() {
+            return Some(Cause::Drive);
+        }
         let Some(Cause::Policy { policy }) = &cause else { return cause };
         let acted = || {
             self.records.iter().rev().any(|act| {
@@ -78,7 +83,29 @@ impl Facts {
             "state_changed" => ends_run || acted(),
             _ => true,
         };
-        if can && self.was_ending(found).is_none() { cause } else { Some(Cause::Drive) }
+        let is_own = can && self.was_ending(found).is_none() && !self.found_nothing_to_do(found, policy);
+        if is_own { cause } else { Some(Cause::Drive) }
+    }
+
+    /// That the STOP key of its drive had stopped the motor, as the reading says itself with which another state was told.
+    fn stop_key_with(&self, found: &RecordView) -> Option<&RecordView> {
+        let is_of_reading = |key: &&RecordView| {
+            key.what == "stop_key"
+                && key.drive == found.drive
+                && (key.time_unix_ms - found.time_unix_ms).abs() <= SAME_READING_MS
+        };
+        self.records.iter().find(is_of_reading).filter(|_| found.what == "state_changed")
+    }
+
+    /// Whether what this program did by a policy at about that time found nothing to be done.
+    pub(in crate::story) fn found_nothing_to_do(&self, found: &RecordView, policy: &str) -> bool {
+        let mut acts = self.records.iter().filter(|act| {
+            act.what == "command"
+                && act.drive == found.drive
+                && (act.time_unix_ms - found.time_unix_ms).abs() <= SEEN_AGAIN_MS
+                && matches!(body(act).cause, Some(Cause::Policy { policy: other }) if other == policy)
+        });
+        acts.any(|act| act.text.contains(": nothing to be done"))
     }
 
     /// The begin of a run that somebody here had asked for, which went on when the program was killed, where it is told of that run that it was
@@ -116,7 +143,14 @@ impl Facts {
     /// An event in words, a trip with what the drive said of it.
     pub(in crate::story) fn in_words(&self, found: &RecordView) -> String {
         let explained = self.explained(found).map(as_trip);
-        explained.unwrap_or_else(|| self.told(found))
+        let text = explained.unwrap_or_else(|| self.told(found));
+        // That its watchdog acts within so long a silence is known, and of a code that nobody knows not that it did.
+        match text.contains(UNLISTED) {
+            true => {
+                text.replace(" by its communication watchdog", ", it may be by its communication watchdog")
+            }
+            false => text,
+        }
     }
 
     /// Events of this name at other drives, not farther from a moment than this. One that answers, if not as it should, is lost and not silent.

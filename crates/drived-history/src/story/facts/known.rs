@@ -75,7 +75,7 @@ impl Facts {
                 "began_after_kill" => {
                     (body.last_known_unix_ms.unwrap_or(i64::MIN), "this program had been killed")
                 }
-                "began" => (ended.unwrap_or(i64::MIN), "this program did not run"),
+                "began" => (ended.unwrap_or(i64::MIN), "this program had not run until then"),
                 "hole" if body.records != Some(0) => {
                     (body.since_unix_ms.unwrap_or(i64::MIN), "records could not be kept")
                 }

@@ -73,7 +73,8 @@ fn a_supply_that_was_away_is_likely_only_of_a_drive_that_was_silent() {
         night.event(300_100, "command_overridden", text, None);
         let story = night.told(299_500);
         let about = &story.about.as_ref().unwrap().text;
-        let told = if is_silent { "its run command went with its supply" } else { "command overridden" };
+        let told =
+            if is_silent { "its run command went, likely with its supply" } else { "command overridden" };
         assert!(about.starts_with(told), "{story:?}");
         assert_eq!(story.why(Certainty::Likely).contains("its supply was away"), is_silent, "{story:?}");
     }

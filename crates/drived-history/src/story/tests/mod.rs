@@ -9,6 +9,7 @@ mod nights;
 mod outsider;
 mod returns;
 mod stops;
+mod whose;
 mod written;
 
 use std::time::Duration;

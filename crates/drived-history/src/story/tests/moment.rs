@@ -176,7 +176,7 @@ fn a_run_command_that_went_with_its_supply_is_told_so_beside_another_moment_too(
     let story = without_supply_for_a_moment("moment-beside").told(390_500);
     let likely = story.why(Certainty::Likely);
     assert!(
-        likely.contains("next before it, 14.8 s away: its run command went with its supply"),
+        likely.contains("next before it, 14.8 s away: its run command went, likely with its supply"),
         "{story:?}"
     );
     assert!(!format!("{:?}", story.why).contains("another word, or a power cycle"), "{story:?}");

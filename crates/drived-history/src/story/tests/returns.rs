@@ -161,7 +161,13 @@ fn a_word_that_went_while_the_drive_was_heard_may_have_gone_by_a_power_cycle_bet
 fn a_run_command_that_went_is_told_by_what_became_of_its_reference_and_not_by_that_it_was_heard() {
     // What a drive shows that was off for less than a look at it lasts, and what another master leaves that only stops it.
     for (name, reference, headline, told, not) in [
-        ("supply", Some(0.0), "its run command went with its supply", "its supply was away", "was not away"),
+        (
+            "supply",
+            Some(0.0),
+            "its run command went, likely with its supply",
+            "its supply was away",
+            "was not away",
+        ),
         (
             "word",
             Some(30.0),

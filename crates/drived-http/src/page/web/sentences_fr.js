@@ -271,7 +271,7 @@ export const SENTENCES_FR = {
   'another setpoint than was given': 'une autre consigne que celle qui a été donnée',
   'see who else writes to this drive, and that its reference is that of the bus': 'voir qui d’autre écrit à ce variateur, et que sa référence est celle du bus',
   'another command word than was written': 'un autre mot de commande que celui qui a été écrit',
-  'a stop at the drive, or an input that holds it': 'un arrêt au variateur, ou une entrée qui le retient',
+  'something that the drive does not tell, such as a stop at it, an input, another master or its supply,': 'ce que le variateur ne dit pas, tel qu’un arrêt à lui-même, une entrée, un autre maître ou son alimentation,',
   'stop it, see what holds it, and start it again if it is to run': 'l’arrêter, voir ce qui le retient, et le redémarrer s’il doit tourner',
   'its setpoint is its run command, so that nothing was written: the next start gives it': 'sa consigne est son ordre de marche : rien n’a été écrit, le prochain démarrage la donne',
   'its register reads back as it was written, and the drive does not tell whose setpoint it goes by: start it, and see its output': 'son registre se relit comme il a été écrit, et le variateur ne dit pas de qui il suit la consigne : le démarrer, et voir sa sortie',
