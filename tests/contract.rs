@@ -232,9 +232,9 @@ async fn a_witness_complains_of_what_is_told_of_a_motor_and_is_not_so_and_of_not
 /// Which question an answer belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum To {
-    TheLast,
-    TheOneBefore,
-    TheOneBeforeThatWasMissed,
+    Last,
+    Before,
+    MissedBefore,
 }
 
 /// What the witnesses say of a motor that is told in force by an answer that has just come, when it lost its supply for a moment since
@@ -251,10 +251,10 @@ async fn told_late(family: Family, to: To) -> Result<(), String> {
     let status = Status { verdict: Some(Verdict::InForce), reference: Some(frequency), ..status };
     rig.machine.power_cycle();
     sleep(Duration::from_millis(30)).await;
-    if to != To::TheLast {
+    if to != To::Last {
         let _ = rig.drive.status().await;
     }
-    let missing = u64::from(to == To::TheOneBeforeThatWasMissed);
+    let missing = u64::from(to == To::MissedBefore);
     let told = Told { status: Arc::new(status), at: Instant::now(), held: true, missing };
     tell.send_replace(Arc::new(Some(told)));
     sleep(Duration::from_millis(100)).await;
@@ -265,8 +265,8 @@ async fn told_late(family: Family, to: To) -> Result<(), String> {
 #[tokio::test(start_paused = true)]
 async fn what_befalls_a_machine_behind_a_question_is_not_held_against_its_answer() {
     for family in Family::BUILT_IN {
-        assert_eq!(told_late(family, To::TheLast).await, Ok(()), "{family}");
-        assert_eq!(told_late(family, To::TheOneBeforeThatWasMissed).await, Ok(()), "{family}");
-        assert!(told_late(family, To::TheOneBefore).await.is_err(), "{family}");
+        assert_eq!(told_late(family, To::Last).await, Ok(()), "{family}");
+        assert_eq!(told_late(family, To::MissedBefore).await, Ok(()), "{family}");
+        assert!(told_late(family, To::Before).await.is_err(), "{family}");
     }
 }
