@@ -29,7 +29,8 @@ pub struct Watch {
     /// What was found otherwise, and not told yet.
     changed: Vec<Ground>,
     armed: bool,
-    was_tripped: bool,
+    /// By what the last look showed a run to have ended: a trip, or direct current.
+    ended_by: Option<Output>,
 }
 
 impl Watch {
@@ -47,13 +48,14 @@ impl Watch {
 
     /// What the shaft does, by what a look at the drive shows: see [`Shaft::see`].
     ///
-    /// A motor that was last seen at rest, holds a run command of this side and has tripped by this look may have turned between the
-    /// two: it is not told at rest.
+    /// A motor that was last seen at rest, holds a run command of this side and has tripped by this look, or is being injected into,
+    /// may have turned between the two: it is not told at rest.
     pub fn see(&mut self, at: Instant, shown: Output, frequency: Option<Frequency>) -> Motion {
-        if self.run.lease().is_some() && shown == Output::Tripped && !self.was_tripped {
+        let ends_a_run = matches!(shown, Output::Tripped | Output::Injection);
+        if self.run.lease().is_some() && ends_a_run && self.ended_by != Some(shown) {
             self.shaft.may_turn();
         }
-        self.was_tripped = shown == Output::Tripped;
+        self.ended_by = Some(shown).filter(|_| ends_a_run);
         self.shaft.see(at, shown, frequency)
     }
 
@@ -200,6 +202,25 @@ mod tests {
         watch.shaft.set_coast_time(Some(Duration::from_secs(9)));
         assert_eq!(watch.see(now + Duration::from_secs(9), Output::Tripped, zero), Motion::AtRest);
         assert_eq!(watch.see(now + Duration::from_secs(10), Output::Tripped, zero), Motion::AtRest);
+    }
+
+    /// A motor at rest was started, nobody could look for four seconds, and a stop by direct current was given: at the next look it flows.
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_may_have_run_unseen_is_not_held_at_once_by_a_current() {
+        let (now, zero) = (Instant::now(), Some(Frequency::ZERO));
+        let mut watch = Watch::default();
+        assert_eq!(watch.see(now, Output::Stands, zero), Motion::AtRest);
+        assert_eq!(
+            watch.see(now, Output::Injection, zero),
+            Motion::Held,
+            "nobody has given it a run command"
+        );
+        watch.run.give(Lease::new(Direction::Forward, 1));
+        assert_eq!(watch.see(now, Output::Stands, zero), Motion::AtRest);
+        assert_eq!(watch.see(now, Output::Injection, zero), Motion::Braking);
+        watch.run.end();
+        assert_eq!(watch.see(now + crate::INJECTION_TIME, Output::Injection, zero), Motion::Held);
+        assert_eq!(watch.see(now + crate::INJECTION_TIME, Output::Injection, zero), Motion::Held);
     }
 
     /// A panel's STOP brings a motor down whose drive runs until it stands.
