@@ -52,6 +52,9 @@ pub(super) struct Body {
     pub(super) reference_before_hz: Option<f64>,
     #[serde(default)]
     pub(super) reference_hz: Option<f64>,
+    /// How far the two readings lie apart between which it went.
+    #[serde(default)]
+    pub(super) unread_ms: Option<i64>,
     /// What a drive showed that was heard, for the first time or again.
     #[serde(default)]
     pub(super) status: Option<Shown>,

@@ -14,6 +14,7 @@ use super::{
     },
     back::{Back, SILENT_TOGETHER_MS, Shows},
     evidence::{BESIDE_MS, inputs_stayed, loss_before, lost_before, names, nobody_asked, seen_beside},
+    own::runs_on,
     silence::stood_still,
     word::{Went, how_it_went, of_reference},
 };
@@ -61,7 +62,10 @@ pub(super) fn silent_with(facts: &Facts, at: i64) -> Vec<Sentence> {
         (begins(other) - start).abs() <= SILENT_TOGETHER_MS
             && stood_still(facts, begins(other), other.time_unix_ms).is_none()
     });
-    let were_fed = silent.iter().any(|other| matches!(Back::behind(facts, other).shows, Shows::Fed(_)));
+    let is_fed = |other: &&RecordView| {
+        runs_on(facts, other) || matches!(Back::behind(facts, other).shows, Shows::Fed(_))
+    };
+    let were_fed = silent.iter().any(is_fed);
     if silent.is_empty() {
         return Vec::new();
     }

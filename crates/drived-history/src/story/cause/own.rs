@@ -28,7 +28,7 @@ pub(super) fn is_block_of_supply(facts: &Facts, about: &RecordView) -> bool {
 }
 
 /// Whether a drive that was lost was running when it was heard again: its supply had not been away.
-fn runs_on(facts: &Facts, lost: &RecordView) -> bool {
+pub(super) fn runs_on(facts: &Facts, lost: &RecordView) -> bool {
     let mut own =
         facts.records.iter().filter(|found| found.number > lost.number && found.drive == lost.drive);
     own.find(|found| found.what == "connected")

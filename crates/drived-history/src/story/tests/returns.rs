@@ -159,23 +159,27 @@ fn a_word_that_went_while_the_drive_was_heard_may_have_gone_by_a_power_cycle_bet
 
 #[test]
 fn a_run_command_that_went_is_told_by_what_became_of_its_reference_and_not_by_that_it_was_heard() {
-    // What a drive shows that was off for less than a look at it lasts, and what another master leaves that only stops it.
-    for (name, reference, headline, told, not) in [
+    // What a drive shows that was off, what another master leaves that writes both or only stops it: no drive is fed again, and answers,
+    // within a second.
+    for (name, reference, apart, headline, told, not) in [
         (
             "supply",
             Some(0.0),
+            6_000,
             "its run command went, likely with its supply",
             "its supply was away",
             "was not away",
         ),
+        ("both", Some(0.0), 600, "command overridden", "", "its supply was"),
         (
             "word",
             Some(30.0),
+            600,
             "its run command went by another word",
             "another word was written to it",
             "its supply was away",
         ),
-        ("untold", None, "command overridden", "", "its supply was"),
+        ("untold", None, 600, "command overridden", "", "its supply was"),
     ] {
         let mut night = Written::begin(&format!("word-{name}"));
         night.heard_between(&[(0, 400)]);
@@ -183,7 +187,7 @@ fn a_run_command_that_went_is_told_by_what_became_of_its_reference_and_not_by_th
             "command overridden: another word, or a power cycle, that took the place of the run command";
         night.event(300_000, "command_overridden", text, None);
         if let Some(reference) = reference {
-            let body = json!({ "reference_before_hz": 30.0, "reference_hz": reference, "unread_ms": 600 });
+            let body = json!({ "reference_before_hz": 30.0, "reference_hz": reference, "unread_ms": apart });
             night.event(300_010, "command_gone", "its run command went", Some(body));
         }
         let story = night.told(300_000);
@@ -192,6 +196,7 @@ fn a_run_command_that_went_is_told_by_what_became_of_its_reference_and_not_by_th
         assert!(story.about.as_ref().unwrap().text.starts_with(headline), "{story:?}");
         let open = story.why(Certainty::NotKnown);
         assert_eq!(open.contains("away for less than two polls"), reference.is_none(), "{story:?}");
+        assert_eq!(open.contains("another master that writes both"), name == "both", "{story:?}");
     }
 }
 

@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use super::{Certainty, Says as _, Written};
+use crate::record::Kind;
 
 const BOB: &str = "ramp stop by bob from socket uid 0: confirmed";
 
@@ -96,5 +97,26 @@ fn what_is_off_at_once_behind_a_ramp_that_was_asked_for_is_told_as_open() {
         night.event(300_006, "state_changed", &format!("state changed: running to {to}"), Some(body));
         let story = night.told(300_000);
         assert_eq!(story.why(Certainty::NotKnown).contains("which no ramp does"), is_open, "{story:?}");
+    }
+}
+
+/// The adapter was off for eight seconds; another master zeroed the pump meanwhile, and the other drive came back running.
+#[test]
+fn what_feeds_several_was_not_away_where_one_of_them_ran_on() {
+    for (state, is_told) in [("running", false), ("ready", true)] {
+        let mut night = Written::begin(&format!("whose-mains-{state}"));
+        night.heard_between(&[(0, 297), (306, 400)]);
+        let lost = || Some(json!({ "silent_for_ms": 3_000 }));
+        night.event(300_000, "lost", "lost for 3.0 s: off-line", lost());
+        night.kept(Kind::Event, Some("pump 2"), 300_100, "lost", "lost for 3.0 s: off-line", lost());
+        let shown = |state: &str| Some(json!({ "status": { "state": state, "control": "bus" } }));
+        night.event(306_000, "connected", "connected", shown("ready"));
+        night.kept(Kind::Event, Some("pump 2"), 306_100, "connected", "connected", shown(state));
+        let text =
+            "command overridden: another word, or a power cycle, that took the place of the run command";
+        night.event(306_010, "command_overridden", text, None);
+        let story = night.told(306_000);
+        assert!(story.why(Certainty::Seen).contains("pump 2 fell silent with it"), "{story:?}");
+        assert_eq!(story.why(Certainty::Likely).contains("such as the mains"), is_told, "{story:?}");
     }
 }
