@@ -47,6 +47,9 @@ pub(super) struct Body {
     pub(super) records: Option<u64>,
     #[serde(default)]
     pub(super) outcome: Option<String>,
+    /// How long it took until that was told.
+    #[serde(default)]
+    pub(super) took_ms: Option<i64>,
     /// What became of the reference of a run command that went.
     #[serde(default)]
     pub(super) reference_before_hz: Option<f64>,

@@ -85,6 +85,8 @@ const SKIPPED_MS: i64 = 24 * 60 * 60_000;
 const STEPPED_MS: i64 = 5_000;
 /// So many other drives of a line are looked at, whether they were heard.
 const NEIGHBOURS: usize = 64;
+/// What became of a command is told with when it was, where that was later than this: it is recorded with when it was asked for.
+const LATER_MS: i64 = 1_500;
 
 impl Facts {
     pub(super) fn gather(connection: &Connection, drive: &str, at: i64) -> Result<Self, StoreError> {
@@ -94,7 +96,8 @@ impl Facts {
         let from = (at - BEFORE_MS).max(first);
         let to = (at + AFTER_MS).min(last).max(from);
         let filter = Filter { from_ms: from, to_ms: to, limit: RECORDS, ..Filter::default() };
-        let Found { records, is_cut } = records(connection, &filter)?;
+        let Found { mut records, is_cut } = records(connection, &filter)?;
+        records.iter_mut().filter(|found| found.kind == "command").for_each(tell_when);
         let skipped = step(connection, at, |from, to| (from..to).contains(&at))?;
         let stepped = step(connection, at, |from, _| (from - at).abs() <= STEPPED_MS)?;
         let of_drive = |found: &&RecordView| found.drive.as_deref() == Some(drive);
@@ -177,4 +180,12 @@ fn step(
         let step = body(step);
         step.from_unix_ms.zip(step.to_unix_ms).is_some_and(|(from, to)| is_one(from, to))
     }))
+}
+
+/// A command that was confirmed long after it was asked for was not confirmed then.
+fn tell_when(found: &mut RecordView) {
+    let took = body(found).took_ms.filter(|took| *took >= LATER_MS);
+    if let Some((took, (asked, told))) = took.zip(found.text.split_once(": confirmed")) {
+        found.text = format!("{asked}: confirmed {} later{told}", lasting(took));
+    }
 }

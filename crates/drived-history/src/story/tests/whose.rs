@@ -52,12 +52,19 @@ fn a_withdrawal_that_found_nothing_to_be_done_has_ended_no_run() {
 #[test]
 fn a_stop_that_is_told_as_unconfirmed_is_not_told_as_confirmed_beside_it() {
     let mut night = Written::begin("whose-unconfirmed");
-    night.asked(298_000, "stop", BOB);
+    let late = json!({ "outcome": "confirmed", "took_ms": 9_984 });
+    night.kept(Kind::Command, Some("pump 1"), 298_000, "stop", BOB, Some(late));
     night.event(300_000, "stop_unconfirmed", "stop unconfirmed since 2.0 s", None);
     let story = night.told(300_000);
     let seen = story.why(Certainty::Seen);
     assert!(seen.contains("the stop was asked for here: ramp stop by bob from socket uid 0"), "{story:?}");
-    assert!(!seen.contains("confirmed\n") && !seen.contains("uid 0: confirmed"), "{story:?}");
+    let all = format!("{seen}\n{}", story.course());
+    assert!(all.contains("uid 0: confirmed 10.0 s later"), "{story:?}");
+    assert_eq!(
+        all.matches(": confirmed").count(),
+        all.matches(": confirmed 10.0 s later").count(),
+        "{story:?}"
+    );
 }
 
 /// An Altivar 58 gives a code that its manual does not list, behind a silence that was shorter than its watchdog's time or longer.
