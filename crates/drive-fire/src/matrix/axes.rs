@@ -456,6 +456,11 @@ impl Event {
     pub(super) const fn silences(self) -> bool {
         matches!(self, Self::PowerOff)
     }
+
+    /// Whether its drive hears nothing then.
+    pub(super) const fn deafens(self) -> bool {
+        matches!(self, Self::PowerOff | Self::CableCut)
+    }
 }
 
 impl fmt::Display for Event {

@@ -137,12 +137,8 @@ impl Cell {
     pub fn untold(&self) -> impl Iterator<Item = Untold> {
         let of_far_end = self.far_end.untold(self.way, self.fault != Fault::None);
         let fast = self.far_end == FarEnd::Fast;
-        // An adapter that had never echoed, in front of a drive without supply or cable: the same as an echo behind which the drive
-        // hears nothing.
-        let hears_nothing = self.event.silences() || self.event == Event::CableCut;
-        let alone = (self.fault == Fault::Echo && hears_nothing).then_some(Fault::EchoAlone);
-        let of_echo = alone.and_then(|fault| fault.untold(self.way, fast));
-        of_far_end.into_iter().chain(self.fault.untold(self.way, fast)).chain(of_echo)
+        let deaf = self.fault.in_front_of(self.event.deafens()).untold(self.way, fast);
+        of_far_end.into_iter().chain(self.fault.untold(self.way, fast)).chain(deaf)
     }
 
     /// Why it cannot exist, or is another one; `None`: it can.

@@ -71,6 +71,11 @@ pub enum Fault {
 }
 
 impl Fault {
+    /// What it is in front of a drive that may hear nothing: the echo of an adapter comes all the same.
+    pub(super) fn in_front_of(self, is_deaf: bool) -> Self {
+        if self == Self::Echo && is_deaf { Self::EchoAlone } else { self }
+    }
+
     /// Every one of them.
     pub const ALL: &[Self] = &[
         Self::None,

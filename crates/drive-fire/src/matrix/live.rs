@@ -306,6 +306,9 @@ fn judge(
     // One that comes down on its ramp steers for nothing.
     let steers = seen.setpoint.abs() > TOLERANCE;
     let moves = seen.running && steers && seen.output_frequency.abs() > TOLERANCE;
+    // The twin heard of no reset, so that its panel could not run it.
+    let by_panel = seen.local && cell.operation == Operation::Reset;
+    let moves = moves && !by_panel;
     let lease = stage.drive.lease();
     if moves && !twin.running && lease.is_none() && !cell.event.silences() {
         notes.object(format!("it moves and no lease stands: {seen:?}"));

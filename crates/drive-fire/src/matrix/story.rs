@@ -85,8 +85,9 @@ impl Story {
     /// What in it nobody can tell from what is right.
     pub fn untold(&self) -> impl Iterator<Item = Untold> {
         let fast = self.far_end == FarEnd::Fast;
+        let is_deaf = self.steps.iter().any(|step| matches!(step, Step::Happens(event) if event.deafens()));
         let of_faults = self.steps.iter().filter_map(move |step| match step {
-            Step::Strike(fault, _) => fault.untold(self.way, fast),
+            Step::Strike(fault, _) => fault.in_front_of(is_deaf).untold(self.way, fast),
             _ => None,
         });
         let struck = self.steps.iter().any(|step| matches!(step, Step::Strike(..)));
