@@ -3,6 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use drive_core::StopMode;
+use drive_fleet::{EventKind, Received};
 use tokio::time::{Instant, sleep, timeout};
 
 use super::{ETA, Peer, plant, read};
@@ -293,8 +294,23 @@ async fn the_motor_of_a_client_that_went_silent_is_stopped_where_told_so() {
         }
         assert!(plant.machines[0].observe().running, "it is heard");
         drop(peer);
+        let mut events = plant.plant.fleet().events();
         sleep(Duration::from_secs(15)).await;
         assert_eq!(plant.machines[0].observe().running, !stops);
+        if stops {
+            // Nobody had asked for it, that client least of all.
+            let told = async {
+                loop {
+                    if let Received::Event(event) = events.recv().await
+                        && matches!(event.kind, EventKind::StopConfirmed { .. })
+                    {
+                        return format!("{:?}", event.cause);
+                    }
+                }
+            };
+            let cause = timeout(Duration::from_secs(5), told).await.expect("it is told");
+            assert!(cause.contains("this program, by on_client_silence"), "{cause}");
+        }
     }
 }
 
