@@ -40,9 +40,10 @@ impl Terminal {
         let size = Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 };
         tcsetwinsize(&end, size).expect("it has a size");
         let its = || Stdio::from(end.try_clone().expect("it can be shared"));
-        // setsid makes it the controlling terminal, so that Ctrl-C is a signal.
-        let mut session = Command::new("setsid");
-        session.arg("--ctty").arg("--wait").arg(command.get_program()).args(command.get_args());
+        // setsid makes it the controlling terminal, so that Ctrl-C is a signal; and where the tests run under nohup, the program does not.
+        let mut session = Command::new("env");
+        session.args(["--default-signal=HUP", "setsid", "--ctty", "--wait"]);
+        session.arg(command.get_program()).args(command.get_args());
         session
             .env("TERM", "xterm-256color")
             .env("LANG", "C.UTF-8")
