@@ -10,7 +10,7 @@ use drive_core::{
 use drive_families::Family;
 use drive_fleet::{
     ConcernKind, DriveSettings, EventKind, ExitAction, Fleet, Link, OnExit, OnFault, Outcome, Periods,
-    Refused, Times, WatchdogCheck, WatchdogContract,
+    Received, Refused, Times, WatchdogCheck, WatchdogContract,
 };
 use drive_sim::{Fault, Panel, SimLine, Wiring, models::atv21::Atv21};
 use drive_testing::witness::Witnesses;
@@ -174,6 +174,28 @@ async fn rule_4_motion_needs_a_drive_that_answers() {
         let outcome = plant.motor().start(Direction::Forward).await;
         assert_eq!(outcome, Outcome::Refused(Refused::NotConnected), "{family}");
         assert_eq!(Plant::writes(plant.machine()), 0, "{family}");
+    })
+    .await;
+}
+
+/// Who reads of a trip finds by its time what was read with it.
+#[tokio::test(start_paused = true)]
+async fn what_one_reading_shows_bears_one_time() {
+    each(async |family| {
+        let plant = Plant::single(family, |_| {});
+        plant.run_at(30).await;
+        let mut events = plant.fleet.events();
+        plant.machine().trip(support::drives::a_trip(family));
+        let (mut change, mut trip) = (None, None);
+        while change.is_none() || trip.is_none() {
+            let Received::Event(event) = events.recv().await else { panic!("{family}: the fleet has ended") };
+            match event.kind {
+                EventKind::StateChanged { to: State::Fault, .. } => change = Some((event.at, event.wall)),
+                EventKind::Tripped(_) => trip = Some((event.at, event.wall)),
+                _ => {}
+            }
+        }
+        assert_eq!(change, trip, "{family}");
     })
     .await;
 }

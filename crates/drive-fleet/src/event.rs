@@ -51,16 +51,21 @@ impl Event {
     /// Something that happens now, outside of every order.
     #[must_use]
     pub fn now(drive: impl Into<Arc<str>>, kind: EventKind, cause: Cause) -> Self {
-        let words = Arc::default();
-        Self {
-            drive: drive.into(),
-            order: 0,
-            at: Instant::now(),
-            wall: SystemTime::now(),
-            kind,
-            cause,
-            words,
-        }
+        let Moment { at, wall } = Moment::now();
+        Self { drive: drive.into(), order: 0, at, wall, kind, cause, words: Arc::default() }
+    }
+}
+
+/// One moment by both clocks: that of all that one reading shows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Moment {
+    at: Instant,
+    wall: SystemTime,
+}
+
+impl Moment {
+    pub(crate) fn now() -> Self {
+        Self { at: Instant::now(), wall: SystemTime::now() }
     }
 }
 
@@ -93,12 +98,13 @@ impl Teller {
         self.events.subscribe()
     }
 
-    pub(crate) fn tell(&self, drive: Arc<str>, happened: Happened) {
+    pub(crate) fn tell(&self, drive: Arc<str>, moment: Moment, happened: Happened) {
         let Happened { kind, cause, words } = happened;
+        let Moment { at, wall } = moment;
         // Told under the lock, so that every reader gets them in their order.
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         *last += 1;
-        let event = Event { order: *last, words, ..Event::now(drive, kind, cause) };
+        let event = Event { drive, order: *last, at, wall, kind, cause, words };
         // Without a reader there is nobody to tell.
         let _ = self.events.send(event);
     }

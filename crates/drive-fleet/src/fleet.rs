@@ -22,7 +22,7 @@ use tokio::{
 
 use crate::{
     cause::{Cause, Policy},
-    event::{Event, EventKind, ExitAction, Happened, Teller},
+    event::{Event, EventKind, ExitAction, Happened, Moment, Teller},
     handle::{DriveHandle, Entry},
     line_entry::LineEntry,
     message::Urgent,
@@ -197,7 +197,8 @@ impl Fleet {
     pub fn tell_finding(&self, drive: &DriveHandle, finding: Finding, present: bool) {
         let Some(teller) = self.sender() else { return };
         let kind = EventKind::LineFinding { finding, present };
-        teller.tell(Arc::clone(drive.name()), Happened { kind, cause: Cause::Found, words: Arc::default() });
+        let happened = Happened { kind, cause: Cause::Found, words: Arc::default() };
+        teller.tell(Arc::clone(drive.name()), Moment::now(), happened);
     }
 
     /// Exchanges the members. Who changes them holds [`Inner::changing`].

@@ -16,7 +16,7 @@ use tokio::{
 
 use crate::{
     cause::Act,
-    event::{ExitAction, Teller},
+    event::{ExitAction, Moment, Teller},
     message::{Message, Urgent},
     outcome::Refused,
     progress::Report,
@@ -268,12 +268,14 @@ impl Desk {
         if let Some(snapshot) = self.supervisor.take_snapshot(Instant::now()) {
             self.snapshots.send_replace(Arc::new(snapshot));
         }
+        // One for all that is told now: who reads of a trip finds the change of the state that was read with it by its time.
+        let moment = Moment::now();
         while let Some(output) = self.supervisor.poll_output() {
             match output {
                 Output::Event(happened) => {
                     let drive = self.supervisor.name();
                     tracing::debug!(%drive, "{}", happened.kind);
-                    self.events.tell(drive, happened);
+                    self.events.tell(drive, moment, happened);
                 }
                 Output::Told(id, told) => {
                     if let Some(asker) = self.askers.remove(&id) {
