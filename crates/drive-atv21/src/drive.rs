@@ -90,9 +90,7 @@ impl<P: Port> Drive for Atv21<P> {
     /// output goes down, the bus commands and no input forces anything (F110 to F113, F118). Where somebody else runs the
     /// motor and the command priority is not set, it is set.
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
-        if mode == StopMode::DcInjection {
-            self.watch.shaft.may_inject();
-        }
+        self.watch.shaft.is_stopped_by(mode);
         self.stop_motor(mode).await
     }
 

@@ -105,9 +105,7 @@ impl<P: Port> Drive for Atv28<P> {
     }
 
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
-        if mode == StopMode::DcInjection {
-            self.proof.watch.shaft.may_inject();
-        }
+        self.proof.watch.shaft.is_stopped_by(mode);
         Ok(drivecom::stop(self, mode).await?.held_by(&self.proof.watch.shaft))
     }
 

@@ -71,9 +71,7 @@ impl<P: Port> Drive for Atv312<P> {
     /// `LAC` or `dCI` allow it. What does not act is replaced by what `Stt` says, and else by the fast stop. A drive whose
     /// settings were not read yet is stopped by the quick stop. At L3 the bits that have another function stay as they are.
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
-        if mode == StopMode::DcInjection {
-            self.proof.watch.shaft.may_inject();
-        }
+        self.proof.watch.shaft.is_stopped_by(mode);
         Ok(self.stop_motor(mode).await?.held_by(&self.proof.watch.shaft))
     }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use crate::units::Frequency;
+use crate::{setpoint::StopMode, units::Frequency};
 
 /// What is known of the shaft. No output is not standstill: a motor whose output was cut coasts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -224,10 +224,10 @@ impl Shaft {
         *self = Self { coast_time: self.coast_time, injection_time: self.injection_time, ..Self::new() };
     }
 
-    /// A stop by direct current is sent. Where the next look shows neither that current nor an output, it may have flowed for a moment
-    /// between them, and a motor that turned coasts.
-    pub const fn may_inject(&mut self) {
-        self.may_inject = true;
+    /// A stop in this mode is sent. Where it is one by direct current and the next look shows neither that current nor an output, it may
+    /// have flowed for a moment between them, and a motor that turned coasts.
+    pub const fn is_stopped_by(&mut self, mode: StopMode) {
+        self.may_inject |= matches!(mode, StopMode::DcInjection);
     }
 
     /// A motor that was seen at rest may have turned since, by what was seen of it besides a status, or not seen at all: without an
@@ -418,10 +418,10 @@ mod tests {
         let mut shaft = braked([30, 29]);
         assert_eq!(shaft.see(later, Output::None, Some(Frequency::ZERO)), Motion::AtRest, "its ramp is over");
         let mut shaft = braked([30, 29]);
-        shaft.may_inject();
+        shaft.is_stopped_by(StopMode::DcInjection);
         assert_eq!(shaft.see(later, Output::None, Some(Frequency::ZERO)), Motion::Coasting);
         let mut rests = resting(now);
-        rests.may_inject();
+        rests.is_stopped_by(StopMode::DcInjection);
         assert_eq!(rests.see(later, Output::None, Some(Frequency::ZERO)), Motion::AtRest);
     }
 

@@ -77,9 +77,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
     }
 
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
-        if mode == StopMode::DcInjection {
-            self.watch.shaft.may_inject();
-        }
+        self.watch.shaft.is_stopped_by(mode);
         self.stop_motor(mode).await
     }
 

@@ -30,17 +30,13 @@ pub(super) fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     let (by_watchdog, is_found) = faults.fold((false, false), |(by_watchdog, is_found), fault| {
         (by_watchdog || fault.by_watchdog, is_found || fault.found)
     });
-    let mut said = vec![match reason(&facts.in_words(about)) {
-        Some(_) if facts.in_words(about).contains(UNLISTED) => Sentence::of(
+    let words = facts.in_words(about);
+    let mut said = vec![match reason(&words) {
+        Some(_) if words.contains(UNLISTED) => Sentence::of(
             Said,
-            format!(
-                "the drive says by what code it tripped, and not what that means: {}",
-                facts.in_words(about)
-            ),
+            format!("the drive says by what code it tripped, and not what that means: {words}"),
         ),
-        Some(_) => {
-            Sentence::of(Said, format!("the drive itself says what it tripped by: {}", facts.in_words(about)))
-        }
+        Some(_) => Sentence::of(Said, format!("the drive itself says what it tripped by: {words}")),
         None => Sentence::of(NotKnown, "that it tripped the drive shows; by what was not read from it"),
     }];
     if let Some(kept) = facts.own_record(about) {
