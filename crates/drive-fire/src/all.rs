@@ -102,7 +102,7 @@ const PARTS: [Part; 9] = [
 ];
 
 /// The plant of a soak.
-const PLANT: soak::Size = soak::Size { lines: 2, drives: 8, time: Duration::from_secs(3_600) };
+const PLANT: soak::Size = soak::Size { lines: 2, drives: 8, time: Duration::from_secs(3_600), calm: 1 };
 
 /// How deep each model is explored, and against its planted defects.
 const DEPTHS: [(Model, usize, usize); 4] =

@@ -136,6 +136,9 @@ enum Part {
         /// So many drives on each.
         #[arg(long, default_value_t = 31)]
         drives: u8,
+        /// Commanded, and asked while it stands, so many times as seldom: a month of a large plant in an hour or two.
+        #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=120))]
+        calm: u32,
         /// A small one against each planted defect, or one of them by its name; those in the line and the fleet need `--features plants`.
         #[arg(long, num_args = 0..=1, default_missing_value = "")]
         plants: Option<String>,
@@ -326,10 +329,10 @@ fn main() -> ExitCode {
         Part::Soak { plants: Some(only), .. } => {
             vec![soak::find_plants(seed, Some(&*only).filter(|only| !only.is_empty()))]
         }
-        Part::Soak { hours, lines, drives, .. } => {
+        Part::Soak { hours, lines, drives, calm, .. } => {
             vec![soak::run(
                 seed,
-                soak::Size { lines, drives, time: Duration::from_secs(3_600 * hours) },
+                soak::Size { lines, drives, time: Duration::from_secs(3_600 * hours), calm },
                 go_on,
             )]
         }

@@ -4,6 +4,7 @@
 //! the days.
 
 mod days;
+mod plant;
 
 use std::{
     collections::BTreeMap,
@@ -13,11 +14,10 @@ use std::{
     time::{Duration, Instant as Clock},
 };
 
-use drive_bus::{Line, LineConfig};
-use drive_core::{Direction, Frequency, SerialSettings, StopMode, serial::CharacterFormat};
-use drive_families::{Family, SetUp};
-use drive_fleet::{DriveHandle, DriveSettings, Fleet, FrequencyLimits, Outcome};
-use drive_sim::{Breach, Fault, Faults, SimLine, SimSlave, Wiring};
+use drive_core::{Direction, Frequency, StopMode};
+use drive_families::Family;
+use drive_fleet::{DriveHandle, Outcome};
+use drive_sim::{Breach, Faults, SimLine, SimSlave};
 use drive_testing::{contract::Open, witness::Witnesses};
 use fastrand::Rng;
 use tokio::time::{Instant, sleep};
@@ -27,9 +27,8 @@ use crate::{
     report::{Find, Plant, Told},
 };
 use days::Days;
+pub use plant::Size;
 
-/// Something is commanded, or happens, this often on each line.
-const EVERY: Duration = Duration::from_secs(3);
 /// Every command is told by then: the longest that a fleet waits for standstill, for a reference and for what it does not know.
 const LONGEST: Duration = Duration::from_secs(240);
 /// What a plant may need more at its end than after a tenth of its time.
@@ -48,17 +47,6 @@ struct Kept {
     passed: Vec<String>,
 }
 
-/// So many lines with so many drives each, for so long.
-#[derive(Debug, Clone, Copy)]
-pub struct Size {
-    /// How many lines.
-    pub lines: usize,
-    /// How many drives on each.
-    pub drives: u8,
-    /// For how long, in virtual time.
-    pub time: Duration,
-}
-
 /// Lives through it.
 ///
 /// # Panics
@@ -67,18 +55,8 @@ pub fn run(seed: u64, size: Size, go_on: impl FnMut() -> bool) -> Told {
     run_with(seed, size, &drive_of, go_on)
 }
 
-impl Size {
-    fn replay(self, seed: u64) -> String {
-        let Self { lines, drives, time } = self;
-        format!(
-            "drive-fire soak --seed {seed} --hours {} --lines {lines} --drives {drives}",
-            time.as_secs() / 3_600
-        )
-    }
-}
-
 /// How much a planted defect is given: a drive of each family on each line.
-const SMALL: Size = Size { lines: 2, drives: 5, time: Duration::from_secs(3_600) };
+const SMALL: Size = Size { lines: 2, drives: 5, time: Duration::from_secs(3_600), calm: 1 };
 
 /// Lives through a small one with each planted defect, or `only` this one.
 pub fn find_plants(seed: u64, only: Option<&str>) -> Told {
@@ -136,47 +114,22 @@ async fn live(
     mut go_on: impl FnMut() -> bool,
 ) -> Duration {
     let mut rng = Rng::with_seed(seed);
-    let settings = SerialSettings::new(19_200, CharacterFormat::F8N1).expect("it is a speed");
-    let mut builder = Fleet::builder().whatever_the_plan();
-    let mut sites = Vec::new();
-    for number in 0..size.lines {
-        let simulated = SimLine::new(Wiring::rtu(settings));
-        let line = Line::over(simulated.in_memory(), LineConfig::stream(settings));
-        let name = format!("line {number}");
-        builder = builder.line(name.clone(), line);
-        // The last one is commanded like every other, and only watched.
-        for address in 1..=size.drives + 1 {
-            let in_turn = Family::BUILT_IN[usize::from(address) % Family::BUILT_IN.len()];
-            // Which takes any address.
-            let family = if address <= size.drives { in_turn } else { Family::ATV312 };
-            let machine = family.machine(SetUp::ForTheBus).expect("it has a twin");
-            simulated.add_boxed(address, machine).expect("the address is free");
-            let high = (address % 3 == 1).then_some(LIMIT);
-            let drive = DriveSettings {
-                control: address <= size.drives,
-                limits: FrequencyLimits { high, ..FrequencyLimits::default() },
-                ..DriveSettings::watched(format!("{number}/{address}"))
-            };
-            builder = builder.drive(&name, address, drive, |port, slave| open(family)(Box::new(port), slave));
-        }
-        simulated.set_faults(faults(rng.u64(..)));
-        sites.push((name, simulated));
-    }
+    let (builder, sites) = plant::build(size, &mut rng, open);
     let fleet = builder.start().expect("whatever the plan");
     *witnesses = Witnesses::of_fleet(&fleet, sites.iter().map(|(name, line)| (&**name, line)));
     let kept = Arc::new(Mutex::new(Kept::default()));
     let (begun, mut early, mut days) = (Instant::now(), None, Days::begin());
-    let config = LineConfig::stream(settings);
+    let config = plant::config();
     while begun.elapsed() < size.time && go_on() {
         for (name, simulated) in &sites {
             let drives = fleet.drives_on(name);
             let drive = &drives[rng.usize(..drives.len())];
             match rng.u8(..10) {
                 0 => happens(&mut rng, simulated, drive),
-                _ => command(&mut rng, drive, &kept),
+                _ => command(&mut rng, drive, size, &kept),
             }
         }
-        sleep(EVERY).await;
+        sleep(size.every()).await;
         days.look(&fleet, &config, memory);
         if early.is_none() && begun.elapsed() * 10 > size.time {
             early = memory();
@@ -243,13 +196,6 @@ async fn live(
     lived
 }
 
-/// One exchange in some fifty is struck.
-fn faults(seed: u64) -> Faults {
-    let kinds =
-        [Fault::RequestFlipped, Fault::Flipped, Fault::Lost, Fault::Truncated, Fault::Noise, Fault::Late];
-    kinds.into_iter().fold(Faults::seeded(seed), |faults, kind| faults.with(kind, 3_500))
-}
-
 fn happens(rng: &mut Rng, simulated: &SimLine, drive: &DriveHandle) {
     let Some(machine) = simulated.slave(drive.slave().number()) else { return };
     let deed = ["panel stop", "motor-supply off", "motor-supply on", "power cycle"][rng.usize(..4)];
@@ -257,7 +203,7 @@ fn happens(rng: &mut Rng, simulated: &SimLine, drive: &DriveHandle) {
     let _ = simulated.control(&format!("{} {deed}", machine.name()));
 }
 
-fn command(rng: &mut Rng, drive: &DriveHandle, kept: &Arc<Mutex<Kept>>) {
+fn command(rng: &mut Rng, drive: &DriveHandle, size: Size, kept: &Arc<Mutex<Kept>>) {
     let frequency = Frequency::from_hertz(rng.u16(15..45));
     let given = Instant::now();
     let is_stop = matches!(rng.u8(..8), 0 | 1);
@@ -265,6 +211,7 @@ fn command(rng: &mut Rng, drive: &DriveHandle, kept: &Arc<Mutex<Kept>>) {
     kept.lock().unwrap_or_else(PoisonError::into_inner).given += 1;
     let drive = drive.clone();
     let order = rng.u8(..8);
+    let runs_for = size.runs_for(rng);
     let is_too_fast = drive.settings().limits.high.is_some_and(|high| frequency > high);
     drop(tokio::spawn(async move {
         let outcome = match order {
@@ -274,17 +221,23 @@ fn command(rng: &mut Rng, drive: &DriveHandle, kept: &Arc<Mutex<Kept>>) {
             _ => drive.set_setpoint(frequency).finished().await,
         };
         let took = given.elapsed();
-        let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.told += 1;
-        *kept.outcomes.entry(word(&outcome)).or_default() += 1;
-        if is_stop {
-            kept.longest_stop = kept.longest_stop.max(took);
+        {
+            let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+            kept.told += 1;
+            *kept.outcomes.entry(word(&outcome)).or_default() += 1;
+            if is_stop {
+                kept.longest_stop = kept.longest_stop.max(took);
+            }
+            if is_too_fast && !is_stop && order != 4 && outcome.is_confirmed() {
+                kept.passed.push(format!("{name}: {frequency} was taken, and {LIMIT} is the most"));
+            }
+            if took > LONGEST {
+                kept.late.push(format!("{name}: told after {took:?}: {outcome}"));
+            }
         }
-        if is_too_fast && !is_stop && order != 4 && outcome.is_confirmed() {
-            kept.passed.push(format!("{name}: {frequency} was taken, and {LIMIT} is the most"));
-        }
-        if took > LONGEST {
-            kept.late.push(format!("{name}: told after {took:?}: {outcome}"));
+        if let Some(runs_for) = runs_for.filter(|_| outcome.is_confirmed() && !is_stop && order != 4) {
+            sleep(runs_for).await;
+            drop(drive.stop(StopMode::Ramp));
         }
     }));
 }
