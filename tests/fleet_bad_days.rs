@@ -188,7 +188,8 @@ async fn a_watchdog_trip_found_at_the_next_start_is_known_by_the_drives_own_code
 
 #[tokio::test(start_paused = true)]
 async fn another_trip_that_came_while_the_line_was_away_is_not_reset_as_the_watchdogs() {
-    for family in [Family::ATV21, Family::ATV312, Family::OMRON_3G3EV] {
+    // The manual of an Altivar 58 names no code for a trip by it: whatever tripped it, it does not say.
+    for family in [Family::ATV21, Family::ATV58, Family::ATV312, Family::OMRON_3G3EV] {
         let mut plant = Plant::single(family, |settings| settings.on_fault = OnFault::ResetWatchdogTrip);
         plant.run_at(30).await;
         plant.happens(&format!("trip {}", drives::a_trip(family)));

@@ -464,12 +464,11 @@ fn trip_details(f: &mut fmt::Formatter<'_>, trip: &Trip) -> fmt::Result {
     if trip.found {
         f.write_str(", found so")?;
     }
-    match trip.watchdog_after {
-        Some(silence) if trip.by_watchdog => {
-            write!(f, " by its communication watchdog after {} without a message", Tenths(silence))?;
-        }
-        _ if trip.by_watchdog => f.write_str(" by its communication watchdog")?,
-        _ => {}
+    if trip.by_watchdog {
+        f.write_str(" by its communication watchdog")?;
+    }
+    if let Some(silence) = trip.watchdog_after {
+        write!(f, " after {} without a message", Tenths(silence))?;
     }
     match trip.faults.as_deref().and_then(|faults| faults.present.first()) {
         Some(fault) => write!(f, ": {fault}"),

@@ -403,6 +403,6 @@ pub enum OnFault {
     #[default]
     Report,
     /// The trip of its communication watchdog after a lost line is reset, once, when the line is back. Every other
-    /// trip waits for somebody.
+    /// trip waits for somebody, and each of a drive whose manual names no code for that of its watchdog (Altivar 58).
     ResetWatchdogTrip,
 }

@@ -216,10 +216,10 @@ pub struct Trip {
     pub status: Timed<Status>,
     /// What the drive said about its faults, as soon as that has been read.
     pub faults: Option<Arc<Faults>>,
-    /// Whether it tripped by its communication watchdog: its own code says so, or, where its family has no code for that, it
-    /// had not been heard for longer than the watchdog's time.
+    /// Whether it tripped by its communication watchdog: its own code says so. Where its manual names none for that it is not known.
     pub by_watchdog: bool,
-    /// For how long the drive had not been heard then; `None` where it was already tripped when it was first seen.
+    /// For how long the drive had not been heard then, where that is longer than its watchdog waits and its code does not say that it
+    /// tripped by another thing; `None` also where it was already tripped when it was first seen.
     pub watchdog_after: Option<Duration>,
 }
 

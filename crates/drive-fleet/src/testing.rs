@@ -20,6 +20,7 @@ pub(crate) const CAPABILITIES: Capabilities = Capabilities {
         settable: true,
         wears: false,
     }),
+    communication_fault: Some(18),
     identification: Some("function 43/14"),
     release: true,
     persist: Some("a bit"),

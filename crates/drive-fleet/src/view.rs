@@ -229,9 +229,9 @@ pub struct TripView {
     /// What it tripped by; absent while the drive has not said.
     #[serde(flatten)]
     pub fault: Option<Fault>,
-    /// Whether by its communication watchdog.
+    /// Whether by its communication watchdog, as its own code says.
     pub by_watchdog: bool,
-    /// How long it had not been heard then.
+    /// How long it had not been heard then, where that is longer than its watchdog waits.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub watchdog_after_ms: Option<u64>,
     /// Whether it was found so: it tripped at some time before.

@@ -98,14 +98,12 @@ impl Supervisor {
         if status.value.is_fault() && !before.as_ref().is_some_and(|before| before.value.is_fault()) {
             let armed_for = self.checks.armed_for().filter(|_| before.is_some());
             let unheard = armed_for.filter(|timeout| silent_for >= *timeout).map(|_| silent_for);
-            let by_watchdog = match (self.communication_fault, status.value.fault_code) {
-                (Some(code), Some(shown)) => code == shown,
-                // Its explanation will tell.
-                (Some(_), None) => false,
-                // The manual of an Altivar 58 names no code for it: how long it was not spoken to is all there is.
-                (None, _) => unheard.is_some(),
-            };
-            let watchdog_after = unheard.filter(|_| by_watchdog || status.value.fault_code.is_none());
+            // Where no code is shown yet, its explanation will tell; where the manual names none for it, as that of an Altivar 58, how
+            // long it was not spoken to is all there is, and anything may have tripped it meanwhile.
+            let is_it =
+                self.communication_fault.zip(status.value.fault_code).map(|(code, shown)| code == shown);
+            let by_watchdog = is_it == Some(true);
+            let watchdog_after = unheard.filter(|_| is_it != Some(false));
             let status = status.clone();
             self.record_trip(
                 now,
@@ -286,7 +284,9 @@ impl Supervisor {
         let by_watchdog = code.is_some_and(|code| faults.present.iter().any(|fault| fault.code == code));
         trip.faults = Some(Arc::new(faults));
         trip.by_watchdog |= by_watchdog;
-        trip.watchdog_after = trip.watchdog_after.filter(|_| trip.by_watchdog);
+        if self.communication_fault.is_some() && !trip.by_watchdog {
+            trip.watchdog_after = None;
+        }
         let explained = trip.clone();
         let present = self.status.as_ref().is_some_and(|status| status.value.is_fault());
         let cause = if explained.found { Cause::Found } else { Cause::Drive };

@@ -90,6 +90,8 @@ pub(super) enum Cause {
 pub(super) struct Fault {
     #[serde(default)]
     pub(super) by_watchdog: bool,
+    /// For how long it had not been heard, where that is longer than its watchdog waits.
+    pub(super) watchdog_after_ms: Option<u64>,
     #[serde(default)]
     pub(super) found: bool,
 }

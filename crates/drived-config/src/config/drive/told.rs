@@ -99,9 +99,11 @@ pub(super) fn when_lost(drive: &DrivePart) -> Option<String> {
 }
 
 pub(super) fn when_tripped(drive: &DrivePart) -> Option<String> {
+    let is_named = drive.name.family.capabilities().communication_fault.is_some();
     let then = match drive.settings.on_fault {
         OnFault::Report => "",
-        OnFault::ResetWatchdogTrip => "; a trip of the watchdog is reset once the line is back",
+        OnFault::ResetWatchdogTrip if is_named => "; a trip of the watchdog is reset once the line is back",
+        OnFault::ResetWatchdogTrip => "; its manual names no code for a trip of the watchdog: none is reset",
     };
     Some(format!("reported{then}"))
 }

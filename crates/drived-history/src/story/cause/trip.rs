@@ -8,7 +8,7 @@ use drived_plant::plant::past::{
 use super::{
     super::{
         body::body,
-        facts::{Facts, UNLISTED, lasting},
+        facts::{Facts, lasting},
     },
     evidence::{
         SILENT_MS, TOGETHER_MS, asked_before, found_within, in_order, inputs_changed, is_of_supply,
@@ -17,6 +17,8 @@ use super::{
     silence::of_silence,
 };
 
+/// How the drives' own words tell of a code that their manual does not name.
+const UNLISTED: &str = "a code that the manual does not list";
 /// Trips of one cause are seen within this time of each other.
 const ONE_CAUSE_MS: i64 = 2_000;
 /// So many others that trip at once do not do so by chance.
@@ -27,9 +29,12 @@ pub(super) fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     // What the drive said of it was read a moment later.
     let explained = facts.explained(about);
     let faults = [Some(about), explained].into_iter().flatten().filter_map(|found| body(found).fault);
-    let (by_watchdog, is_found) = faults.fold((false, false), |(by_watchdog, is_found), fault| {
-        (by_watchdog || fault.by_watchdog, is_found || fault.found)
-    });
+    let (mut by_watchdog, mut is_found, mut unheard) = (false, false, false);
+    for fault in faults {
+        by_watchdog |= fault.by_watchdog;
+        is_found |= fault.found;
+        unheard |= fault.watchdog_after_ms.is_some();
+    }
     let words = facts.in_words(about);
     let mut said = vec![match reason(&words) {
         Some(_) if words.contains(UNLISTED) => Sentence::of(
@@ -48,6 +53,10 @@ pub(super) fn of_trip(facts: &Facts, about: &RecordView) -> Vec<Sentence> {
     if by_watchdog {
         said.extend(of_silence(facts, at));
     } else {
+        if unheard {
+            let text = "it had heard no message for longer than its watchdog waits: whether that tripped it, its code does not say";
+            said.push(Sentence::of(NotKnown, text));
+        }
         if is_found {
             said.extend(lost_before(facts, at));
         }

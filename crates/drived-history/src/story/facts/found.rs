@@ -10,8 +10,6 @@ use super::{
     Facts, SEEN_AGAIN_MS,
 };
 
-/// What is told of a code that a manual does not list (drive-core).
-pub(in crate::story) const UNLISTED: &str = "a code that the manual does not list";
 /// What is told of one reading is recorded within this time.
 const SAME_READING_MS: i64 = 150;
 
@@ -143,14 +141,7 @@ impl Facts {
     /// An event in words, a trip with what the drive said of it.
     pub(in crate::story) fn in_words(&self, found: &RecordView) -> String {
         let explained = self.explained(found).map(as_trip);
-        let text = explained.unwrap_or_else(|| self.told(found));
-        // That its watchdog acts within so long a silence is known, and of a code that nobody knows not that it did.
-        match text.contains(UNLISTED) {
-            true => {
-                text.replace(" by its communication watchdog", ", it may be by its communication watchdog")
-            }
-            false => text,
-        }
+        explained.unwrap_or_else(|| self.told(found))
     }
 
     /// Events of this name at other drives, not farther from a moment than this. One that answers, if not as it should, is lost and not silent.

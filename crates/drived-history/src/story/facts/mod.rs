@@ -13,7 +13,7 @@ use rusqlite::Connection;
 use self::known::{gaps, heard};
 pub(super) use self::{
     fall::Fall,
-    found::{UNLISTED, begins, is_silent},
+    found::{begins, is_silent},
     known::{known_spans, lasting},
 };
 use super::body::body;

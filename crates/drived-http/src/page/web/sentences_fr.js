@@ -342,6 +342,8 @@ const PATTERNS = [
   [/^(\d+) (\w+): (.+)$/, (code, mnemonic, meaning) => `${code} ${mnemonic} : ${FAULTS_FR[meaning] ?? meaning}`],
   [/^by its communication watchdog(?: after (.+) without a message)?(?:: (.+))?$/, (time, what) =>
     `par sa surveillance de communication${time ? ` après ${number(time)} sans message` : ''}${what ? ` : ${french(what)}` : ''}`],
+  [/^after (.+) without a message(?:: (.+))?$/, (time, what) =>
+    `après ${number(time)} sans message${what ? ` : ${french(what)}` : ''}`],
   [/^(.+ stop), sent (\d+) times?$/, (stop, times) => `${reaction(stop)}, envoyé ${times} fois`],
   [/^(.+ stop) for (.+), (the drive is stopping|it is repeated)$/, (stop, time, how) =>
     `${reaction(stop)} depuis ${number(time)}, ${how === 'it is repeated' ? 'il est répété' : 'le variateur s’arrête'}`],

@@ -95,7 +95,8 @@ impl Teller {
         let Some(present) = trip.faults.as_ref().and_then(|faults| faults.present.first()) else { return };
         let mut text = fault(present);
         if let Some(silence) = trip.watchdog_after {
-            text = format!("{text}, by its communication watchdog after {} without a message", Span(silence));
+            let by = if trip.by_watchdog { "by its communication watchdog " } else { "" };
+            text = format!("{text}, {by}after {} without a message", Span(silence));
         }
         let is_it = |held: &Held| held.drive == *drive && matches!(held.what, What::Trip { .. });
         match self.held.iter().position(is_it) {

@@ -62,6 +62,11 @@ pub(super) const PHRASES: &[(&str, &str)] = &[
         "déclenché par sa surveillance de communication après {0} sans message : {1}",
     ),
     (
+        "tripped, found so after {} without a message: {s}",
+        "en défaut, trouvé ainsi, après {0} sans message : {1}",
+    ),
+    ("tripped after {} without a message: {s}", "déclenché après {0} sans message : {1}"),
+    (
         "tripped, found so by its communication watchdog: {s}",
         "en défaut, trouvé ainsi, par sa surveillance de communication : {0}",
     ),
