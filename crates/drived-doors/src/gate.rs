@@ -107,6 +107,11 @@ pub struct SessionView {
     rights: Rights,
 }
 
+/// When a request came, in its extensions: before its body was read, and before a disk was waited for. What it asks expires from then
+/// on, and a stop that comes meanwhile came after it.
+#[derive(Debug, Clone, Copy)]
+pub struct Arrived(pub Instant);
+
 /// What holds for one door.
 #[derive(Debug, Clone)]
 pub(super) struct Door {
@@ -267,6 +272,7 @@ impl Gate {
         B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
     {
         let (mut parts, body) = request.into_parts();
+        parts.extensions.insert(Arrived(Instant::now()));
         if drive_fleet::mutant!("any-host", !door.hosts.allow(&parts.headers), false) {
             let why =
                 "this server has no such name: allowed_hosts in the configuration names those that it has";

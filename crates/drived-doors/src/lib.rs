@@ -53,6 +53,7 @@ use tokio::{
     time::{Instant, sleep, timeout},
 };
 
+pub use self::gate::Arrived;
 #[cfg(unix)]
 pub use self::gate::{LINKS, LOGIN, LOGOUT, LoginBody, MadeLink, NewLink, SessionView};
 #[cfg(unix)]

@@ -42,10 +42,14 @@ fn router() -> Router {
     async fn started() -> Response {
         (StatusCode::CONFLICT, r#"{"id":"c-1","outcome":"refused"}"#).into_response()
     }
+    async fn came(Extension(Arrived(at)): Extension<Arrived>) -> String {
+        format!("{} ms ago", at.elapsed().as_millis())
+    }
     Router::new()
         .route("/api/v1/state", get(who).post(who))
         .route("/api/v1/stop", post(who))
         .route("/api/v1/drives/{name}/start", post(started))
+        .route("/api/v1/drives/{name}/setpoint", post(came))
         .route("/api/v1/events", get(events))
 }
 

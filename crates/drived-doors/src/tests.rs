@@ -325,6 +325,24 @@ async fn a_request_says_64_kib_at_the_most() {
     rig.ask_on_socket(&Asked { body: &(most.clone() + " "), ..START }).await.assert_refused(413);
 }
 
+#[tokio::test(start_paused = true)]
+async fn a_request_came_when_its_head_did_and_not_when_it_was_written_down() {
+    let rig = Rig::new("came");
+    let token = rig.token("panel", Role::Operate);
+    let mut stream = rig.connect();
+    let head = format!(
+        "POST /api/v1/drives/pump/setpoint HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {token}\r\n\
+         Content-Type: application/json\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{{"
+    );
+    stream.write_all(head.as_bytes()).await.unwrap();
+    sleep(Duration::from_millis(700)).await;
+    stream.write_all(b"}").await.unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).await.unwrap();
+    let ago = answer.lines().last().and_then(|last| last.strip_suffix(" ms ago")?.parse::<u64>().ok());
+    assert!(ago.is_some_and(|ago| ago >= 700), "{answer}");
+}
+
 const HEAD: &[u8] = b"GET /api/v1/state HTTP/1.1\r\nHost: localhost\r\n";
 
 #[tokio::test(start_paused = true)]

@@ -47,14 +47,15 @@ impl<S: Send + Sync> FromRequestParts<S> for Viewer {
     }
 }
 
-/// When the request came: before its body was read.
+/// When the request came, as its door has seen it: now, where there is none.
 pub(super) struct Arrived(pub(super) Instant);
 
 impl<S: Send + Sync> FromRequestParts<S> for Arrived {
     type Rejection = Problem;
 
-    async fn from_request_parts(_: &mut Parts, _: &S) -> Result<Self, Problem> {
-        Ok(Self(Instant::now()))
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        let came = parts.extensions.get::<drived_doors::Arrived>();
+        Ok(Self(came.map_or_else(Instant::now, |came| came.0)))
     }
 }
 

@@ -376,6 +376,26 @@ async fn what_is_not_allowed_is_refused_with_its_reason() {
     assert!((0..3).all(|index| !is_running(&plant, index)));
 }
 
+/// Behind its door it waits for the disk of the audit log, for however long that takes.
+#[tokio::test(start_paused = true)]
+async fn what_came_before_a_stop_is_not_begun_behind_it_and_its_time_runs_from_its_door_on() {
+    let plant = TestPlant::of(1).await;
+    let came = |ago: Duration| {
+        let router = api(&plant.plant, "operator", ALL);
+        router.layer(Extension(drived_doors::Arrived(Instant::now() - ago)))
+    };
+    let start = || post(RUN, &json!({"setpoint": {"frequency_hz": 20.0}, "expires_in_ms": 1_000}));
+    let (_, late) = send(came(Duration::from_millis(1_001)), start()).await;
+    assert_eq!(late["outcome"], "expired", "{late}");
+    assert_eq!(command(&plant.plant, STOP, &json!({})).await.0, StatusCode::OK);
+    sleep(Duration::from_millis(100)).await;
+    let (status, before) = send(came(Duration::from_millis(400)), start()).await;
+    assert_eq!((status, &before["outcome"]), (StatusCode::CONFLICT, &"superseded".into()), "{before}");
+    sleep(Duration::from_secs(10)).await;
+    assert!(!is_running(&plant, 0));
+    assert_eq!(send(came(Duration::from_millis(50)), start()).await.0, StatusCode::OK);
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_token_for_one_group_moves_its_drives_alone_and_stops_them_all() {
     let plant = TestPlant::with(3, DriveSettings::controlled).await;
