@@ -1,6 +1,7 @@
 //! Every part in turn, round after round with other numbers, until its time is over: what attacks for as long as anybody lets it.
 
 use std::{
+    cell::Cell,
     env,
     ffi::OsStr,
     fmt, io,
@@ -34,15 +35,17 @@ pub struct Row {
 type Came = io::Result<(Vec<Told>, Vec<Told>)>;
 
 /// A part in a round: its numbers begin here, and it goes on until then.
-struct Turn {
+struct Turn<'a> {
     is_first: bool,
     seed: u64,
     end: Instant,
     /// How many this part has tried in the rounds before.
     before: u64,
+    /// With which of its targets the program is attacked first.
+    program: &'a Cell<program::Target>,
 }
 
-impl Turn {
+impl Turn<'_> {
     fn go_on(&self) -> impl FnMut() -> bool + use<> {
         let end = self.end;
         move || Instant::now() < end
@@ -55,7 +58,7 @@ impl Turn {
 }
 
 /// A part: its name, its share of a round in seconds, and what it does there.
-type Part = (&'static str, u64, fn(&Turn) -> Came);
+type Part = (&'static str, u64, fn(&Turn<'_>) -> Came);
 
 /// All of them.
 const PARTS: [Part; 9] = [
@@ -78,7 +81,8 @@ const PARTS: [Part; 9] = [
     }),
     ("program", 25, |turn| {
         let program = env::current_exe()?.with_file_name("drived");
-        let tried = program::run(&program, turn.seed, Duration::from_secs(3), None, turn.go_on())
+        let of_each = Duration::from_secs(3);
+        let tried = program::run(&program, turn.seed, of_each, None, turn.program, turn.go_on())
             .map_err(|error| io::Error::other(format!("{}: {error}", program.display())))?;
         Ok((vec![tried], turn.hunt(|| [program::find_plants()])))
     }),
@@ -135,6 +139,7 @@ pub fn run(seed: u64, end: Option<Instant>, mut say: impl FnMut(&str)) -> Summar
     let row = |name| Row { name, tried: Vec::new(), hunted: Vec::new(), lacks: None };
     let rows = PARTS.iter().map(|(name, ..)| row(name)).collect();
     let mut summary = Summary { seed, rounds: 0, took: Duration::ZERO, rows };
+    let program = Cell::new(program::Target::ALL[0]);
     while summary.rounds == 0 || end.is_some_and(|end| Instant::now() < end) {
         let seed = seed.wrapping_add(summary.rounds);
         summary.rounds += 1;
@@ -146,6 +151,7 @@ pub fn run(seed: u64, end: Option<Instant>, mut say: impl FnMut(&str)) -> Summar
                 seed,
                 end: end.map_or(share, |end| end.min(share)),
                 before,
+                program: &program,
             };
             match attack(&turn) {
                 Ok((tried, hunted)) => {

@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 use std::{
+    cell::Cell,
     env, fs, io,
     path::{Path, PathBuf},
     process::{self, ExitCode},
@@ -287,7 +288,10 @@ fn main() -> ExitCode {
             let beside = || Ok(env::current_exe()?.with_file_name("drived"));
             let told = program.map_or_else(beside, Ok).and_then(|path| match mbusd {
                 Some(mbusd) => program::beside_mbusd(&path, &mbusd, seed, Duration::from_secs(seconds)),
-                None => program::run(&path, seed, Duration::from_secs(seconds), only, go_on),
+                None => {
+                    let first = Cell::new(program::Target::ALL[0]);
+                    program::run(&path, seed, Duration::from_secs(seconds), only, &first, go_on)
+                }
             });
             match told {
                 Ok(told) => vec![told],
