@@ -84,7 +84,7 @@ const PARTS: [Part; 9] = [
         let of_each = Duration::from_secs(3);
         let tried = program::run(&program, turn.seed, of_each, None, turn.program, turn.go_on())
             .map_err(|error| io::Error::other(format!("{}: {error}", program.display())))?;
-        Ok((vec![tried], turn.hunt(|| [program::find_plants()])))
+        Ok((vec![tried], turn.hunt(|| [program::find_plants(), program::find_plants_on_ptys()])))
     }),
     ("differential, pymodbus", 10, |turn| {
         let python = env::var_os("DRIVED_PYTHON").unwrap_or_else(|| "python3".into());

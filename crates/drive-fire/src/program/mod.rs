@@ -6,11 +6,13 @@ mod beside;
 mod broker;
 mod doors;
 mod files;
+mod host;
 mod judge;
 mod misfortunes;
 mod mqtt;
 mod plant;
 mod plants;
+mod process;
 mod promises;
 
 use std::{
@@ -84,6 +86,19 @@ impl Target {
 /// One of the two cannot be run, or does not answer.
 pub fn beside_mbusd(program: &Path, mbusd: &Path, seed: u64, time: Duration) -> io::Result<Told> {
     beside::run(&Plant::start(program)?, mbusd, seed, time)
+}
+
+/// On ptys, commanded over HTTP all the time, while its host misbehaves, for as long as it goes on.
+///
+/// # Errors
+/// The program cannot be run as it is to be: what is found is no error.
+pub fn on_ptys(program: &Path, seed: u64, go_on: impl FnMut() -> bool) -> io::Result<Told> {
+    host::run(program, None, seed, go_on)
+}
+
+/// What a wrong program would say or do there, and whether it is taken for wrong.
+pub fn find_plants_on_ptys() -> Told {
+    host::find_plants()
 }
 
 /// How much more the daemon may hold behind it all, in KiB: caches fill, and allocators keep what they have had.
