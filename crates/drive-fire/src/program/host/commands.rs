@@ -83,10 +83,10 @@ fn tell(hour: &Hour, what: &str, answer: &io::Result<(u16, Value)>) {
 /// It is answered, and followed until it is confirmed; the motor stands then.
 fn stop(hour: &Hour, drive: &Drive, body: &str) -> Result<(), String> {
     let begun = Instant::now();
-    let mut answer = hour.site.ask("POST", &drive.path("stop?wait=30s"), Some(body));
+    let answer = hour.site.ask("POST", &drive.path("stop?wait=30s"), Some(body));
     tell(hour, "stop", &answer);
+    let (mut status, mut told) = answer.map_err(|error| format!("a stop is not answered: {error}"))?;
     loop {
-        let (status, told) = answer.map_err(|error| format!("a stop is not answered: {error}"))?;
         let took = begun.elapsed();
         judge::in_time(took).map_err(|why| format!("{why}: {told}"))?;
         let id = match judge::stop(status, &told)? {
@@ -103,6 +103,10 @@ fn stop(hour: &Hour, drive: &Drive, body: &str) -> Result<(), String> {
             }
         };
         hour.wait(Duration::from_millis(100));
-        answer = hour.site.ask("GET", &format!("/api/v1/commands/{id}?wait=30s"), None);
+        // Whoever cannot be told now asks again: it goes on meanwhile.
+        match hour.site.ask("GET", &format!("/api/v1/commands/{id}?wait=30s"), None) {
+            Ok((200, more)) => (status, told) = (200, more),
+            _ => hour.count("looks at a stop that were not answered"),
+        }
     }
 }

@@ -74,8 +74,8 @@ pub(super) fn status(said: &Said, around: &[Look]) -> Result<(), String> {
     if !said.is_good {
         return Ok(());
     }
-    // What is told in milliseconds was judged before that.
-    if said.age > MAX_AGE {
+    // It was judged at some moment since it was asked for, and its age told behind that.
+    if said.age > MAX_AGE + said.told.saturating_duration_since(said.asked) {
         return Err(format!("a status of {:?} ago is told as good", said.age));
     }
     if let Some(hertz) = said.status.output_frequency {

@@ -158,6 +158,11 @@ mod tests {
         // It comes up: what it showed a moment ago is not what it shows now.
         let up = Second::of([0, 4, 8, 12, 16, 20, 24, 28]);
         assert_eq!(up.judged(200, Status { at_reference: Some(false), ..driven(14) }), Ok(()));
+        // It was fresh when it was asked for, and the daemon stood still before it told so.
+        let stands = Second::of([0; 8]);
+        let said = stands.said(3_400, at_rest());
+        let late = Said { told: said.asked + Duration::from_millis(600), ..said };
+        assert_eq!(judge::status(&late, &stands.looks), Ok(()));
         // What is told as old is judged by nobody.
         let runs = Second::of([30; 8]);
         let stale = Said { is_good: false, ..runs.said(200, at_rest()) };
