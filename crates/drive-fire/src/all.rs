@@ -39,6 +39,8 @@ struct Turn<'a> {
     is_first: bool,
     seed: u64,
     end: Instant,
+    /// When the last round ends, whoever has had his share by then.
+    end_of_all: Option<Instant>,
     /// How many this part has tried in the rounds before.
     before: u64,
     /// With which of its targets the program is attacked first.
@@ -79,10 +81,14 @@ const PARTS: [Part; 9] = [
         let tried = vec![fuzz::run(&fuzz::Target::ALL, turn.seed, of_each, turn.go_on())];
         Ok((tried, if turn.is_first { fuzz::hunts(turn.seed, fuzz::ORDERS, None) } else { Vec::new() }))
     }),
+    // From when it has begun, which takes as long where there is much else to do.
     ("program", 25, |turn| {
         let program = env::current_exe()?.with_file_name("drived");
-        let of_each = Duration::from_secs(3);
-        let tried = program::run(&program, turn.seed, of_each, None, turn.program, turn.go_on())
+        let (of_each, share) = (Duration::from_secs(3), Duration::from_secs(25));
+        let round = program::Round { of_each, share, first: turn.program };
+        let end = turn.end_of_all;
+        let go_on = || end.is_none_or(|end| Instant::now() < end);
+        let tried = program::run(&program, turn.seed, &round, None, go_on)
             .map_err(|error| io::Error::other(format!("{}: {error}", program.display())))?;
         Ok((vec![tried], turn.hunt(|| [program::find_plants(), program::find_plants_on_ptys()])))
     }),
@@ -150,6 +156,7 @@ pub fn run(seed: u64, end: Option<Instant>, mut say: impl FnMut(&str)) -> Summar
                 is_first: summary.rounds == 1,
                 seed,
                 end: end.map_or(share, |end| end.min(share)),
+                end_of_all: end,
                 before,
                 program: &program,
             };

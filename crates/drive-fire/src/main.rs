@@ -301,7 +301,9 @@ fn main() -> ExitCode {
                 Some(mbusd) => program::beside_mbusd(&path, &mbusd, seed, Duration::from_secs(seconds)),
                 None => {
                     let first = Cell::new(program::Target::ALL[0]);
-                    program::run(&path, seed, Duration::from_secs(seconds), only, &first, go_on)
+                    let of_each = Duration::from_secs(seconds);
+                    let round = program::Round { of_each, share: Duration::MAX, first: &first };
+                    program::run(&path, seed, &round, only, go_on)
                 }
             });
             match told {

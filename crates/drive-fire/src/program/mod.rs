@@ -104,17 +104,26 @@ pub fn find_plants_on_ptys() -> Told {
 /// How much more the daemon may hold behind it all, in KiB: caches fill, and allocators keep what they have had.
 const GROWTH: u64 = 64 * 1024;
 
-/// Attacks this program, each target for so long, or one of them by one execution. It begins with the target `first`, and leaves there the
-/// one with which the next round is to begin, so that each has its turn however early a round ends.
+/// A round of attacks.
+#[derive(Debug)]
+pub struct Round<'a> {
+    /// For so long each target.
+    pub of_each: Duration,
+    /// For so long all of them, from when the program has begun.
+    pub share: Duration,
+    /// With which it begins; then with which the next one is to begin, so that each has its turn however early a round ends.
+    pub first: &'a Cell<Target>,
+}
+
+/// Attacks this program, every target, or one of them by one execution.
 ///
 /// # Errors
 /// The program cannot be run as it is to be: what is found is no error.
 pub fn run(
     program: &Path,
     seed: u64,
-    of_each: Duration,
+    Round { of_each, share, first }: &Round<'_>,
     only: Option<(Target, u64)>,
-    first: &Cell<Target>,
     mut go_on: impl FnMut() -> bool,
 ) -> io::Result<Told> {
     let begun = Instant::now();
@@ -122,6 +131,8 @@ pub fn run(
     let mut plant = Plant::start(program)?;
     let files = files::Files::of(&plant)?;
     let before = plant.memory();
+    let attacked = Instant::now();
+    let mut go_on = || go_on() && attacked.elapsed() < *share;
     for target in Target::ALL {
         told.count_as(format!("{target:?}"), 0);
     }
@@ -134,10 +145,8 @@ pub fn run(
             Target::Mqtt => mqtt::COUNT,
             _ => 0,
         };
-        let wants_more = |count| began.elapsed() < of_each || count < least;
-        // A round that took all its time to begin comes to one of its first target all the same.
-        let mut goes_on = |count| go_on() || count == 0 && target == begins_with;
-        while wants_more(count) && goes_on(count) && (only.is_none() || count == 0) {
+        let wants_more = |count| began.elapsed() < *of_each || count < least;
+        while wants_more(count) && go_on() && (only.is_none() || count == 0) {
             let number =
                 only.map_or(seed.wrapping_mul(1_000_000_007).wrapping_add(count), |(_, number)| number);
             count += 1;
