@@ -18,11 +18,10 @@ const ON_PTYS: &str = "Ptys";
 const LONGEST: Duration = Duration::from_secs(120);
 
 /// Of those that tests of their own crates find, the ones that misfortunes, and faults of the host, are to find as well.
-const OF_TESTS: [(&str, &str); 6] = [
+const OF_TESTS: [(&str, &str); 5] = [
     ("stop-waits-for-the-disk", "Misfortunes"),
     ("age-of-the-telling", ON_PTYS),
     ("stop-not-repeated", ON_PTYS),
-    ("untaken-stop-confirmed", ON_PTYS),
     ("lease-forgotten-at-exit", ON_PTYS),
     ("door-ends-without-descriptors", ON_PTYS),
 ];
