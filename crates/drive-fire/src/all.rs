@@ -1,6 +1,7 @@
 //! Every part in turn, round after round with other numbers, until its time is over: what attacks for as long as anybody lets it.
 
 use std::{
+    cell::Cell,
     env,
     ffi::OsStr,
     fmt, io,
@@ -34,15 +35,19 @@ pub struct Row {
 type Came = io::Result<(Vec<Told>, Vec<Told>)>;
 
 /// A part in a round: its numbers begin here, and it goes on until then.
-struct Turn {
+struct Turn<'a> {
     is_first: bool,
     seed: u64,
     end: Instant,
+    /// When the last round ends, whoever has had his share by then.
+    end_of_all: Option<Instant>,
     /// How many this part has tried in the rounds before.
     before: u64,
+    /// With which of its targets the program is attacked first.
+    program: &'a Cell<program::Target>,
 }
 
-impl Turn {
+impl Turn<'_> {
     fn go_on(&self) -> impl FnMut() -> bool + use<> {
         let end = self.end;
         move || Instant::now() < end
@@ -55,7 +60,7 @@ impl Turn {
 }
 
 /// A part: its name, its share of a round in seconds, and what it does there.
-type Part = (&'static str, u64, fn(&Turn) -> Came);
+type Part = (&'static str, u64, fn(&Turn<'_>) -> Came);
 
 /// All of them.
 const PARTS: [Part; 9] = [
@@ -76,11 +81,16 @@ const PARTS: [Part; 9] = [
         let tried = vec![fuzz::run(&fuzz::Target::ALL, turn.seed, of_each, turn.go_on())];
         Ok((tried, if turn.is_first { fuzz::hunts(turn.seed, fuzz::ORDERS, None) } else { Vec::new() }))
     }),
+    // From when it has begun, which takes as long where there is much else to do.
     ("program", 25, |turn| {
         let program = env::current_exe()?.with_file_name("drived");
-        let tried = program::run(&program, turn.seed, Duration::from_secs(3), None, turn.go_on())
+        let (of_each, share) = (Duration::from_secs(3), Duration::from_secs(25));
+        let round = program::Round { of_each, share, first: turn.program };
+        let end = turn.end_of_all;
+        let go_on = || end.is_none_or(|end| Instant::now() < end);
+        let tried = program::run(&program, turn.seed, &round, None, go_on)
             .map_err(|error| io::Error::other(format!("{}: {error}", program.display())))?;
-        Ok((vec![tried], turn.hunt(|| [program::find_plants()])))
+        Ok((vec![tried], turn.hunt(|| [program::find_plants(), program::find_plants_on_ptys()])))
     }),
     ("differential, pymodbus", 10, |turn| {
         let python = env::var_os("DRIVED_PYTHON").unwrap_or_else(|| "python3".into());
@@ -135,6 +145,7 @@ pub fn run(seed: u64, end: Option<Instant>, mut say: impl FnMut(&str)) -> Summar
     let row = |name| Row { name, tried: Vec::new(), hunted: Vec::new(), lacks: None };
     let rows = PARTS.iter().map(|(name, ..)| row(name)).collect();
     let mut summary = Summary { seed, rounds: 0, took: Duration::ZERO, rows };
+    let program = Cell::new(program::Target::ALL[0]);
     while summary.rounds == 0 || end.is_some_and(|end| Instant::now() < end) {
         let seed = seed.wrapping_add(summary.rounds);
         summary.rounds += 1;
@@ -145,7 +156,9 @@ pub fn run(seed: u64, end: Option<Instant>, mut say: impl FnMut(&str)) -> Summar
                 is_first: summary.rounds == 1,
                 seed,
                 end: end.map_or(share, |end| end.min(share)),
+                end_of_all: end,
                 before,
+                program: &program,
             };
             match attack(&turn) {
                 Ok((tried, hunted)) => {

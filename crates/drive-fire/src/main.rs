@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 use std::{
+    cell::Cell,
     env, fs, io,
     path::{Path, PathBuf},
     process::{self, ExitCode},
@@ -94,6 +95,9 @@ enum Part {
         /// Its gateway beside this mbusd, for so many seconds.
         #[arg(long)]
         mbusd: Option<PathBuf>,
+        /// Over ptys in real time, commanded all the time while its host misbehaves, for so many seconds or `--minutes`.
+        #[arg(long, conflicts_with_all = ["target", "mbusd"])]
+        ptys: bool,
     },
     /// Who accepts what: ours and somebody else.
     Differential {
@@ -205,7 +209,11 @@ fn program_plants(
     only: Option<&str>,
     go_on: impl FnMut() -> bool,
 ) -> io::Result<Vec<Told>> {
-    let mut told = if only.is_none() { vec![program::find_plants()] } else { Vec::new() };
+    let mut told = if only.is_none() {
+        vec![program::find_plants(), program::find_plants_on_ptys()]
+    } else {
+        Vec::new()
+    };
     if cfg!(feature = "plants") {
         let beside = || Ok(env::current_exe()?.with_file_name("drived"));
         let program = program.map_or_else(beside, |path: &Path| Ok::<_, io::Error>(path.to_owned()))?;
@@ -279,7 +287,7 @@ fn main() -> ExitCode {
                 Err(error) => return ended(Err(error)),
             }
         }
-        Part::Program { program, seconds, target, execution, mbusd, .. } => {
+        Part::Program { program, seconds, target, execution, mbusd, ptys, .. } => {
             let known =
                 |name: &String| program::Target::ALL.into_iter().find(|known| format!("{known:?}") == *name);
             let only = target.as_ref().and_then(known).zip(execution);
@@ -289,8 +297,17 @@ fn main() -> ExitCode {
             }
             let beside = || Ok(env::current_exe()?.with_file_name("drived"));
             let told = program.map_or_else(beside, Ok).and_then(|path| match mbusd {
+                None if ptys => {
+                    let end = end.unwrap_or_else(|| Instant::now() + Duration::from_secs(seconds));
+                    program::on_ptys(&path, seed, || Instant::now() < end)
+                }
                 Some(mbusd) => program::beside_mbusd(&path, &mbusd, seed, Duration::from_secs(seconds)),
-                None => program::run(&path, seed, Duration::from_secs(seconds), only, go_on),
+                None => {
+                    let first = Cell::new(program::Target::ALL[0]);
+                    let of_each = Duration::from_secs(seconds);
+                    let round = program::Round { of_each, share: Duration::MAX, first: &first };
+                    program::run(&path, seed, &round, only, go_on)
+                }
             });
             match told {
                 Ok(told) => vec![told],

@@ -17,14 +17,12 @@ use super::{
     broker::message,
     doors, judge, mqtt,
     plant::{Disk, Plant},
-    promises,
+    process, promises,
 };
 use crate::{child, fuzz::Source};
 
 /// Until all is as it was, at the most.
 const LONGEST: Duration = Duration::from_secs(60);
-/// The supply of descriptors that a daemon is given again.
-const DESCRIPTORS: u64 = 1_024;
 
 /// How many there are.
 pub(super) const COUNT: u64 = 3;
@@ -126,15 +124,16 @@ fn nothing_is_put_aside(history: &Path) -> Result<(), String> {
 
 /// Nothing more can be opened, while sixty ask to be let in: who is in already stops his motor, and behind it all live on.
 fn without_descriptors(plant: &Plant) -> Result<(), String> {
-    let Some(limit) = plant.free_descriptor() else { return Ok(()) };
-    if !plant.limit_descriptors(limit) {
+    let Some(pid) = plant.pid() else { return Ok(()) };
+    let Some(limit) = process::free_descriptor(pid) else { return Ok(()) };
+    if !process::limit_descriptors(pid, limit) {
         return Err("skipped: prlimit is not there".to_owned());
     }
     let ports = [plant.http, plant.gateway].into_iter().cycle().take(60);
     let waiting: Vec<_> = ports.filter_map(|port| TcpStream::connect(("127.0.0.1", port)).ok()).collect();
     let stopped = mqtt::answers(&plant.broker);
     drop(waiting);
-    plant.limit_descriptors(DESCRIPTORS);
+    process::limit_descriptors(pid, process::DESCRIPTORS);
     stopped?;
     until("life", || doors::lives(plant).map(|()| true))
 }

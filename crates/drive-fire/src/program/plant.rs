@@ -1,7 +1,6 @@
 //! A daemon over simulated drives, in a folder of its own; both are ended with it.
 
 use std::{
-    collections::BTreeSet,
     fs::{self, File},
     io::{self, Read as _, Write as _},
     net::{TcpListener, TcpStream},
@@ -11,7 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{broker::Broker, misfortunes};
+use super::{broker::Broker, misfortunes, process};
 
 /// Until it is there, at the most.
 const READY: Duration = Duration::from_secs(60);
@@ -171,32 +170,16 @@ impl Plant {
         self.folder.join("state")
     }
 
-    fn process(&self) -> Option<PathBuf> {
-        Some(PathBuf::from(format!("/proc/{}", self.daemon.as_ref()?.id())))
-    }
-
     /// The disk of the daemon's state, as it is seen from here; `None`: it has none of its own.
     pub(super) fn seen_disk(&self) -> Option<PathBuf> {
         let state = self.state();
         let below = state.strip_prefix("/").ok()?;
-        Some(self.process()?.join("root").join(below)).filter(|_| self.disk == Disk::Small)
+        Some(process::folder(self.pid()?).join("root").join(below)).filter(|_| self.disk == Disk::Small)
     }
 
-    /// The least number of which the daemon has nothing open: with that as its limit it opens nothing more.
-    pub(super) fn free_descriptor(&self) -> Option<u64> {
-        let open = fs::read_dir(self.process()?.join("fd")).ok()?;
-        let open: BTreeSet<u64> =
-            open.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok()).collect();
-        (0..).find(|number| !open.contains(number))
-    }
-
-    /// From now on the daemon may have no descriptor of this number or above. False: nobody can say so here.
-    pub(super) fn limit_descriptors(&self, limit: u64) -> bool {
-        let Some(daemon) = &self.daemon else { return false };
-        let mut command = Command::new("prlimit");
-        command.arg(format!("--pid={}", daemon.id())).arg(format!("--nofile={limit}:"));
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
+    /// The process of the daemon.
+    pub(super) fn pid(&self) -> Option<u32> {
+        self.daemon.as_ref().map(Child::id)
     }
 
     /// Another line with the same drives, which this daemon does not serve.
@@ -297,8 +280,6 @@ impl Plant {
 
     /// What it holds in memory, in KiB; `None`: this system does not say.
     pub(super) fn memory(&self) -> Option<u64> {
-        let status = fs::read_to_string(format!("/proc/{}/status", self.daemon.as_ref()?.id())).ok()?;
-        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-        line.split_whitespace().next()?.parse().ok()
+        process::memory(self.pid()?)
     }
 }

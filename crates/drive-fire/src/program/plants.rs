@@ -1,16 +1,30 @@
 //! Wrong lines in the program, one daemon with each: what is promised at a broker, and what befalls the process, are to find them.
 
-use std::{path::Path, time::Instant};
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
 
-use super::{Target, misfortunes, mqtt, plant::Plant, promises};
+use super::{Target, host, misfortunes, mqtt, plant::Plant, promises};
 use crate::{
     fuzz::Source,
     mutation::{self, Fate},
     report::{Plant as Planted, Told},
 };
 
-/// Of those that tests of their own crates find, the ones that misfortunes are to find as well.
-const OF_TESTS: [(&str, &str); 1] = [("stop-waits-for-the-disk", "Misfortunes")];
+/// The program on ptys, with its host's faults: no target, for it takes its own time.
+const ON_PTYS: &str = "Ptys";
+/// How long a wrong line is looked for there.
+const LONGEST: Duration = Duration::from_secs(120);
+
+/// Of those that tests of their own crates find, the ones that misfortunes, and faults of the host, are to find as well.
+const OF_TESTS: [(&str, &str); 5] = [
+    ("stop-waits-for-the-disk", "Misfortunes"),
+    ("age-of-the-telling", ON_PTYS),
+    ("stop-not-repeated", ON_PTYS),
+    ("lease-forgotten-at-exit", ON_PTYS),
+    ("door-ends-without-descriptors", ON_PTYS),
+];
 
 /// Each of them, or those whose name or target is `only`, against this program, which has them all.
 pub fn find_plants(program: &Path, only: Option<&str>, mut go_on: impl FnMut() -> bool) -> Told {
@@ -39,6 +53,16 @@ pub fn find_plants(program: &Path, only: Option<&str>, mut go_on: impl FnMut() -
 fn attack(program: &Path, name: &str, target: &str, count: &mut u64) -> Option<String> {
     // For as long as the program lives: it is one name of a few dozen.
     let name: &'static str = name.to_owned().leak();
+    if target == ON_PTYS {
+        let begun = Instant::now();
+        return match host::run(program, Some(name), SEEN, || begun.elapsed() < LONGEST) {
+            Ok(told) => {
+                *count += told.count;
+                told.finds.first().map(|find| find.what.chars().take(160).collect())
+            }
+            Err(error) => Some(format!("it does not begin: {error}")),
+        };
+    }
     let mut plant = match Plant::with_mutant(program, Some(name)) {
         Ok(plant) => plant,
         Err(error) => return Some(format!("it does not begin: {error}")),
