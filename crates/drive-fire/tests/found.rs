@@ -178,6 +178,7 @@ fn no_order_of_a_gateway_that_was_a_find_is_one_again() {
         ("Silent", "aagiggeeeij", "the same"),
         ("Silent", "fffgjjjee", "the same, of what was given up when all before it was over"),
         ("Unknown", "ffgbbihgjgijadgj", "the only probe went to a drive that nobody asked for"),
+        ("Silent", &*"f".repeat(30), "thirty stops in vain end after two minutes: the model was wrong"),
         ("Unknown", "hcdhjgde", "a timeout of a second, learned behind what a lost connection had asked"),
     ] {
         assert_eq!(Model::named("gateway").expect("it is one").again(setting, steps), Ok(()), "{what}");
