@@ -66,6 +66,9 @@ enum Part {
         /// One execution by the bytes of a file, whoever has chosen them.
         #[arg(long, requires = "target", conflicts_with = "execution")]
         bytes: Option<PathBuf>,
+        /// Writes the bytes of 256 executions of it into this folder, for a fuzzer that coverage guides to begin with.
+        #[arg(long, requires = "target", conflicts_with_all = ["execution", "bytes"])]
+        corpus: Option<PathBuf>,
         /// Against its planted defects, or those that orders of events to one target are to find; those in the line and the fleet need
         /// `--features plants`.
         #[arg(long)]
@@ -254,10 +257,8 @@ fn main() -> ExitCode {
             vec![matrix::find_plants(seed, of_each as usize, only)]
         }
         Part::Matrix { of_each, .. } => vec![matrix::run(seed, of_each, go_on)],
-        Part::Fuzz { target, execution, bytes, seconds, plants, orders } => {
-            let known =
-                |name: &String| fuzz::Target::ALL.into_iter().find(|known| format!("{known:?}") == *name);
-            let only = target.as_ref().and_then(known);
+        Part::Fuzz { target, execution, bytes, corpus, seconds, plants, orders } => {
+            let only = target.as_deref().and_then(fuzz::Target::named);
             if target.is_some() && only.is_none() {
                 eprintln!("it is none of {:?}", fuzz::Target::ALL);
                 return ExitCode::FAILURE;
@@ -266,6 +267,9 @@ fn main() -> ExitCode {
                 let told = fuzz::hunts(seed, orders, only);
                 told.iter().for_each(|told| print!("{told}"));
                 return found_nothing(&told);
+            }
+            if let Some((target, folder)) = only.zip(corpus) {
+                return ended(target.write_corpus(seed, 256, &folder));
             }
             let once = match (only, execution, bytes.map(fs::read).transpose()) {
                 (_, _, Err(error)) => return ended(Err(error)),

@@ -147,13 +147,19 @@ fn a_slave_whose_answer_was_damaged_has_its_pause_before_a_stop() {
 /// Found by long orders of events through the master of a line.
 #[test]
 fn no_order_of_a_line_that_was_a_find_is_one_again() {
-    for (steps, what) in [
-        ("kjaehfahiila", "a stop in the pause behind a late answer in the exchange that it broke off"),
-        ("fjekiiaail", "a repeated stop sent into another's late answer"),
-        ("famiikjll", "an answer later than its window, which nobody can tell: the model was wrong"),
-        ("aheiiijialfmiikmlfccmijiajl", "a late answer whose check ends with 00h"),
+    for (setting, steps, what) in [
+        (
+            "Wire",
+            "kjaehfahiila",
+            "a stop in the pause behind a late answer in the exchange that it broke off",
+        ),
+        ("Wire", "fjekiiaail", "a repeated stop sent into another's late answer"),
+        ("Wire", "famiikjll", "an answer later than its window, which nobody can tell: the model was wrong"),
+        ("Wire", "aheiiijialfmiikmlfccmijiajl", "a late answer whose check ends with 00h"),
+        ("Gateway", "aaaaaaaaaaaaaaaaa", "seventeen stops in vain end after 300 s: the model was wrong"),
+        ("Gateway", &"a".repeat(60), "the same of sixty"),
     ] {
-        assert_eq!(Model::named("master").expect("it is one").again("Wire", steps), Ok(()), "{what}");
+        assert_eq!(Model::named("master").expect("it is one").again(setting, steps), Ok(()), "{what}");
     }
 }
 
@@ -182,6 +188,7 @@ fn no_order_of_a_gateway_that_was_a_find_is_one_again() {
             "the same, by a stop that went out when it had been at nothing for four",
         ),
         ("Unknown", "ffgbbihgjgijadgj", "the only probe went to a drive that nobody asked for"),
+        ("Silent", &*"f".repeat(30), "thirty stops in vain end after two minutes: the model was wrong"),
         ("Unknown", "hcdhjgde", "a timeout of a second, learned behind what a lost connection had asked"),
     ] {
         assert_eq!(Model::named("gateway").expect("it is one").again(setting, steps), Ok(()), "{what}");

@@ -28,17 +28,34 @@ pub(super) const PDUS: &[&[u8]] = &[
     &[1, 3, 0xCD, 0x6B, 5],
 ];
 
+/// The longest file or text.
+pub(super) const LONGEST: usize = 0xFFFF;
+
 /// A PDU, as printed or changed.
 pub(super) fn pdu(rng: &mut Source) -> Vec<u8> {
-    let mut pdu = PDUS[rng.usize(..PDUS.len())].to_vec();
-    if rng.bool() {
-        change(rng, &mut pdu);
-    }
+    let mut pdu = rng.bytes(253, |rng| {
+        let mut pdu = PDUS[rng.usize(..PDUS.len())].to_vec();
+        if rng.bool() {
+            change(rng, &mut pdu);
+        }
+        if pdu.is_empty() {
+            pdu.push(rng.u8(..));
+        }
+        pdu
+    });
     if pdu.is_empty() {
-        pdu.push(rng.u8(..));
+        pdu.push(0);
     }
-    pdu.truncate(253);
     pdu
+}
+
+/// One of these texts, changed.
+pub(super) fn text(rng: &mut Source, texts: &[&str]) -> Vec<u8> {
+    rng.bytes(LONGEST, |rng| {
+        let mut text = texts[rng.usize(..texts.len())].as_bytes().to_vec();
+        change(rng, &mut text);
+        text
+    })
 }
 
 /// One to four changes, each of a kind that finds something somewhere.

@@ -8,7 +8,10 @@ use drived_words::{
 };
 use serde_json::Value;
 
-use super::{bytes::change, source::Source};
+use super::{
+    bytes::{LONGEST, change, text},
+    source::Source,
+};
 
 /// Commands as the README of `drived` has them, and what is wrong in a way of its own.
 const COMMANDS: &[&str] = &[
@@ -23,14 +26,17 @@ const COMMANDS: &[&str] = &[
 
 /// The common reader and ours say the same of any bytes; what stands twice is seen, and the last of it counts for both.
 pub(super) fn json(rng: &mut Source) -> Result<(), String> {
-    let mut text = COMMANDS[rng.usize(..COMMANDS.len())].as_bytes().to_vec();
-    if rng.u8(..16) == 0 {
-        let depth = rng.usize(1..400);
-        text = [b"{\"a\":".repeat(depth), text, b"}".repeat(depth)].concat();
-    }
-    for _ in 0..rng.usize(..3) {
-        change(rng, &mut text);
-    }
+    let text = rng.bytes(LONGEST, |rng| {
+        let mut text = COMMANDS[rng.usize(..COMMANDS.len())].as_bytes().to_vec();
+        if rng.u8(..16) == 0 {
+            let depth = rng.usize(1..400);
+            text = [b"{\"a\":".repeat(depth), text, b"}".repeat(depth)].concat();
+        }
+        for _ in 0..rng.usize(..3) {
+            change(rng, &mut text);
+        }
+        text
+    });
     let differs = |what: &str| Err(format!("{what}: {:?}", String::from_utf8_lossy(&text)));
     match (Object::read(&text), serde_json::from_slice::<Value>(&text)) {
         (Ok(Some(object)), Ok(Value::Object(theirs))) => {
@@ -60,11 +66,14 @@ pub(super) fn sparkplug(rng: &mut Source) -> Result<(), String> {
         }),
         ..Metric::default()
     };
-    let metrics = (0..rng.usize(..6)).map(|_| metric(rng)).collect();
-    let mut bytes = Payload { timestamp: Some(rng.u64(..)), seq: Some(rng.u64(..256)), metrics }.encode();
-    for _ in 0..rng.usize(..4) {
-        change(rng, &mut bytes);
-    }
+    let bytes = rng.bytes(LONGEST, |rng| {
+        let metrics = (0..rng.usize(..6)).map(|_| metric(rng)).collect();
+        let mut bytes = Payload { timestamp: Some(rng.u64(..)), seq: Some(rng.u64(..256)), metrics }.encode();
+        for _ in 0..rng.usize(..4) {
+            change(rng, &mut bytes);
+        }
+        bytes
+    });
     let Ok(read) = Payload::decode(&bytes) else { return Ok(()) };
     if read.metrics.len() > MOST_METRICS {
         return Err(format!("{} metrics", read.metrics.len()));
@@ -88,9 +97,7 @@ pub(super) fn specs(rng: &mut Source) -> Result<(), String> {
         "rtu-tcp:server:4001,9600,8N1,unitelway",
         "limit=10Hz..50Hz",
     ];
-    let mut text = SPECS[rng.usize(..SPECS.len())].as_bytes().to_vec();
-    change(rng, &mut text);
-    let text = String::from_utf8_lossy(&text).into_owned();
+    let text = String::from_utf8_lossy(&text(rng, SPECS)).into_owned();
     let refusals = [
         text.parse::<DriveSpec>().err().map(|error| error.to_string()),
         text.parse::<Addresses>().err().map(|error| error.to_string()),

@@ -1,6 +1,6 @@
 //! Fuzzing: honest loops over whatever takes bytes, texts or orders of events from outside, from corpora of frames that manuals print.
 //! Each target has something to hold what comes out against, besides that nothing panics and everything ends. The numbers of an
-//! execution are those of a seed, or bytes of a file.
+//! execution are those of a seed, or bytes of a file: so a fuzzer that coverage guides attacks the same (the workspace `guided`).
 
 mod broken;
 mod bytes;
@@ -13,7 +13,8 @@ mod supervisor;
 
 use std::{
     collections::BTreeMap,
-    panic,
+    fs, io, panic,
+    path::Path,
     time::{Duration, Instant},
 };
 
@@ -81,6 +82,12 @@ impl Target {
         Self::Supervisor,
     ];
 
+    /// The one of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|target| format!("{target:?}") == name)
+    }
+
     /// One execution with the numbers of a seed.
     ///
     /// # Errors
@@ -95,6 +102,21 @@ impl Target {
     /// What does not hold.
     pub fn execute_on(self, bytes: &[u8]) -> Result<(), String> {
         self.execute_with(Source::of(bytes), None)
+    }
+
+    /// Writes the bytes of so many executions from this one on into files of their own, for whoever chooses bytes to begin with: the frames
+    /// and texts of manuals stand in them as they are.
+    ///
+    /// # Errors
+    /// As the file system has it.
+    pub fn write_corpus(self, seed: u64, count: u64, folder: &Path) -> io::Result<()> {
+        fs::create_dir_all(folder)?;
+        (seed..seed.saturating_add(count)).try_for_each(|number| {
+            let (source, told) = Source::recorded(number);
+            // What it finds it finds again by these bytes.
+            drop(self.execute_with(source, None));
+            fs::write(folder.join(number.to_string()), told.try_iter().flatten().collect::<Vec<u8>>())
+        })
     }
 
     fn execute_with(self, mut rng: Source, defect: Option<Defect>) -> Result<(), String> {
@@ -248,4 +270,25 @@ fn find_plants_of(
     }
     told.took = begun.elapsed();
     told
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_an_execution_finds_is_found_by_its_recorded_bytes() {
+        let defect = Some(Defect::MakesUp);
+        // The numbers of Modbus TCP begin anywhere.
+        for target in [Target::Rtu, Target::Ascii] {
+            let found = (0..20_000).find_map(|seed| {
+                let (source, told) = Source::recorded(seed);
+                let why = target.execute_with(source, defect).err()?;
+                Some((why, told.try_iter().flatten().collect::<Vec<u8>>()))
+            });
+            // All that was heard stands in it.
+            let (why, bytes) = found.expect("it is found");
+            assert_eq!(target.execute_with(Source::of(&bytes), defect), Err(why), "{bytes:02X?}");
+        }
+    }
 }

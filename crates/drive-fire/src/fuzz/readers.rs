@@ -1,6 +1,6 @@
 //! Whatever reads a stream, a file or a text.
 
-use std::time::Duration;
+use std::{io, time::Duration};
 
 use drive_bus::{
     Gateway, LineConfig, Protocol,
@@ -12,7 +12,7 @@ use drive_profile::shipped;
 use drive_sim::{SimLine, models::atv312::Atv312};
 
 use super::{
-    bytes::{ascii_frame, change, pieces, rtu_frame, telway_frame},
+    bytes::{LONGEST, ascii_frame, change, pieces, rtu_frame, telway_frame, text},
     source::Source,
 };
 
@@ -50,18 +50,30 @@ pub(super) fn ear(rng: &mut Source) -> Result<(), String> {
     Ok(())
 }
 
-/// A file that is read piece by piece gives what it gives as a whole.
-pub(super) fn capture(rng: &mut Source) -> Result<(), String> {
+/// A capture of a few frames, as it was written or changed.
+fn written(rng: &mut Source) -> io::Result<Vec<u8>> {
     let mut file = Vec::new();
-    let mut writer = capture::Writer::new(&mut file, Dissector::Rtu).map_err(|error| error.to_string())?;
+    let mut writer = capture::Writer::new(&mut file, Dissector::Rtu)?;
     for (at, piece) in (0..).zip(pieces(rng, rtu_frame)) {
         let direction = if at % 2 == 0 { Direction::Sent } else { Direction::Received };
-        let captured = Captured { at: Duration::from_millis(at * 7), direction, bytes: piece.into() };
-        writer.write(&captured).map_err(|error| error.to_string())?;
+        writer.write(&Captured { at: Duration::from_millis(at * 7), direction, bytes: piece.into() })?;
     }
     if rng.u8(..4) > 0 {
         change(rng, &mut file);
     }
+    Ok(file)
+}
+
+/// A file that is read piece by piece gives what it gives as a whole.
+pub(super) fn capture(rng: &mut Source) -> Result<(), String> {
+    let mut is_written = Ok(());
+    let file = rng.bytes(LONGEST, |rng| {
+        written(rng).unwrap_or_else(|error| {
+            is_written = Err(error.to_string());
+            Vec::new()
+        })
+    });
+    is_written?;
     let whole = capture::read(&file).map(|recording| recording.frames);
     let mut reader = capture::Reader::default();
     let (mut frames, mut rest, mut failed) = (Vec::new(), file.as_slice(), None);
@@ -92,9 +104,8 @@ pub(super) fn capture(rng: &mut Source) -> Result<(), String> {
 
 /// A shipped profile that was changed is one, or is refused.
 pub(super) fn profile(rng: &mut Source) -> Result<(), String> {
-    let (_, text) = shipped::TEXTS[rng.usize(..shipped::TEXTS.len())];
-    let mut text = text.as_bytes().to_vec();
-    change(rng, &mut text);
+    let texts: Vec<&str> = shipped::TEXTS.iter().map(|(_, text)| *text).collect();
+    let text = text(rng, &texts);
     let text = String::from_utf8_lossy(&text);
     if let Err(refusals) = drive_profile::read(&text)
         && refusals.to_string().is_empty()
@@ -122,9 +133,7 @@ pub(super) fn control(rng: &mut Source) -> Result<(), String> {
     let line = SimLine::default();
     line.add(1, Atv312::under_bus_control()).map_err(|error| error.to_string())?;
     for _ in 0..8 {
-        let mut text = LINES[rng.usize(..LINES.len())].as_bytes().to_vec();
-        change(rng, &mut text);
-        let text = String::from_utf8_lossy(&text).into_owned();
+        let text = String::from_utf8_lossy(&text(rng, LINES)).into_owned();
         if line.control(&text).is_err_and(|error| error.to_string().is_empty()) {
             return Err(format!("{text:?} is refused without a word"));
         }
@@ -146,9 +155,7 @@ pub(super) fn words(rng: &mut Source) -> Result<(), String> {
         "247",
         "at-once=2,wait=1s",
     ];
-    let mut text = WORDS[rng.usize(..WORDS.len())].as_bytes().to_vec();
-    change(rng, &mut text);
-    let text = String::from_utf8_lossy(&text).into_owned();
+    let text = String::from_utf8_lossy(&text(rng, WORDS)).into_owned();
     again::<SlaveAddress>(&text)?;
     again::<SerialSettings>(&text)?;
     again::<Setpoint>(&text)?;

@@ -41,6 +41,8 @@ const WAIT: Duration = Duration::from_millis(1_000);
 const TIMEOUT: Duration = Duration::from_millis(300);
 /// Behind the last step so much time passes, in which everything ends.
 const AFTER: Duration = Duration::from_secs(120);
+/// And so much more for each call: a stop in vain behind others in vain has a share of the line that grows with what a gateway owes.
+const AFTER_EACH: Duration = Duration::from_secs(30);
 /// So long after somebody has asked for a drive it may be asked by itself; a probe that was begun in time has a turn of the clock more.
 const INTEREST: Duration = Duration::from_secs(61);
 /// The registers of a stop, a command and a read.
@@ -291,7 +293,7 @@ impl World {
     /// Everything has ended, and a drive that lives is answered for.
     fn ends(&mut self) -> Held {
         self.dead.remove(&1);
-        self.run_for(AFTER)?;
+        self.run_for(AFTER + AFTER_EACH * self.calls.len() as u32)?;
         self.master.handle_timeout(self.now);
         if self.calls.values().any(|call| call.outcome.is_none()) {
             return Err("every call ends");

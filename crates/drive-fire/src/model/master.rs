@@ -39,6 +39,8 @@ const RESPONSE: Duration = Duration::from_millis(5);
 const LIFETIME: Duration = Duration::from_millis(1_000);
 /// Behind the last step so much time passes, in which everything ends.
 const AFTER: Duration = Duration::from_secs(300);
+/// And so much more for each call: a stop in vain behind others in vain has a share of the line that grows with what a gateway owes.
+const AFTER_EACH: Duration = Duration::from_secs(30);
 
 /// One step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -420,7 +422,7 @@ impl World {
         if let Some(lost) = self.under_way.take() {
             self.lost.push(lost);
         }
-        let until = self.now + AFTER;
+        let until = self.now + AFTER + AFTER_EACH * self.calls.len() as u32;
         while self.now < until {
             if !self.goes_on_before(until)? {
                 break;
