@@ -464,7 +464,7 @@ impl Gate {
             let Some(secret) = sessions::cookie(headers) else { return Ok(None) };
             let hash = self.sessions.token(secret, Instant::now());
             let (Some(sha256), Some(tokens)) = (hash, &self.tokens) else { return Ok(None) };
-            let token = tokens.of_hash(&sha256)?;
+            let token = if stops { tokens.of_hash_for_stop(&sha256) } else { tokens.of_hash(&sha256) }?;
             let secret = secret.to_owned();
             return Ok(token.map(|token| {
                 let role = token.role;
@@ -479,7 +479,11 @@ impl Gate {
         let secret = secret
             .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"))
             .map(|(_, secret)| secret.trim());
-        match secret.map(|secret| self.token(secret)).transpose()?.flatten() {
+        let find = |secret: &str| match &self.tokens {
+            Some(tokens) if stops => tokens.of_hash_for_stop(&sha256(secret.as_bytes())),
+            _ => self.token(secret),
+        };
+        match secret.map(find).transpose()?.flatten() {
             Some(token) => {
                 // By that which was brought: it may end before the one that has replaced it.
                 let sha256 = sha256(secret.unwrap_or_default().as_bytes());

@@ -65,6 +65,24 @@ async fn tokens_that_cannot_be_read_keep_nobody_from_a_stop_that_needs_none() {
     rig.ask(&Asked { headers: &forwarded, ..STOP }).await.assert_refused(503);
 }
 
+/// As when the program has no descriptor left: nothing can be opened, and nobody has changed the file.
+#[cfg(unix)]
+#[tokio::test]
+async fn tokens_that_cannot_be_looked_at_keep_nobody_from_a_stop_whose_token_was_right() {
+    let rig = Rig::new("unopened");
+    let bearer = format!("Bearer {}", rig.token("panel", Role::Operate));
+    let headers = [("authorization", bearer.as_str()), ("x-forwarded-for", "10.0.0.7")];
+    let stop = Asked { headers: &headers, ..STOP };
+    let stopped = rig.ask(&stop).await.body;
+    let (file, aside) = (rig.folder.file("tokens"), rig.folder.file("aside"));
+    fs::rename(&file, &aside).unwrap();
+    std::os::unix::fs::symlink(&aside, &file).unwrap();
+    rig.ask(&Asked { headers: &headers, ..START }).await.assert_refused(503);
+    let wrong = [("authorization", "Bearer drv_0"), headers[1]];
+    rig.ask(&Asked { headers: &wrong, ..STOP }).await.assert_refused(401);
+    assert_eq!(rig.ask(&stop).await.body, stopped);
+}
+
 #[tokio::test]
 async fn a_wrong_token_is_never_taken_for_none_and_ten_a_minute_are_looked_at() {
     let rig = Rig::new("wrong-token");

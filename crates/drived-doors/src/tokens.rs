@@ -204,11 +204,18 @@ impl Tokens {
 
     /// The token with this hash.
     pub(super) fn of_hash(&self, wanted: &str) -> Result<Option<Token>, TokenError> {
-        let now = now();
-        Ok(self
-            .all()?
-            .into_iter()
-            .fold(None, |found, token| if token.is(wanted, now) { Some(token) } else { found }))
+        Ok(of_hash(self.all()?, wanted))
+    }
+
+    /// The same for a stop: while the file cannot be looked at, as where the program has no descriptor left, of those that were read last.
+    pub(super) fn of_hash_for_stop(&self, wanted: &str) -> Result<Option<Token>, TokenError> {
+        let all = self.all();
+        if let Err(TokenError::File { what: "read", .. }) = all
+            && let Some((_, known)) = &*self.read.lock().unwrap_or_else(PoisonError::into_inner)
+        {
+            return Ok(of_hash(known.clone(), wanted));
+        }
+        Ok(of_hash(all?, wanted))
     }
 
     /// Adds a token, for so long or for ever, and gives its secret, which nobody can ever read again.
@@ -308,6 +315,12 @@ impl Tokens {
     fn failed(&self, what: &'static str, reason: impl fmt::Display) -> TokenError {
         TokenError::File { file: self.file().to_owned(), what, reason: reason.to_string() }
     }
+}
+
+/// Each is compared, whichever it is.
+fn of_hash(tokens: Vec<Token>, wanted: &str) -> Option<Token> {
+    let now = now();
+    tokens.into_iter().fold(None, |found, token| if token.is(wanted, now) { Some(token) } else { found })
 }
 
 /// Whether a token of this name may be added to these.
