@@ -89,6 +89,10 @@ fn no_cell_that_was_a_find_is_one_again() {
 #[test]
 fn no_story_that_was_a_find_is_one_again() {
     for (line, what) in [
+        (
+            "4.4.0.e11.o12.e7",
+            "a 3G3EV run by its panel behind a reset, of which its twin heard nothing: the stories were wrong",
+        ),
         ("5.4.0.o5.l3.o8.o10", "freewheel behind a ramp: told at rest at 5 Hz, as if the ramp had ended"),
         ("3.4.0.o13.e14.e12", "released to the terminals, which start it: the stories were wrong"),
         (

@@ -20,6 +20,8 @@ struct Done {
     started: bool,
     /// Control was to be given back, whatever became of it.
     released: bool,
+    /// A fault was to be reset, whatever became of it.
+    reset: bool,
     touched: bool,
 }
 
@@ -96,6 +98,7 @@ async fn ask(story: &Story, stage: &mut Stage, operation: Operation, done: &mut 
     }
     done.started |= matches!(operation, Operation::Start(_));
     done.released |= operation == Operation::Release;
+    done.reset |= operation == Operation::Reset;
     if matches!(operation, Operation::Stop(_)) && told.is_ok() && !done.touched {
         // Behind a confirmed stop it steers for nothing, or comes down.
         let before = seen.output_frequency.abs();
@@ -122,8 +125,9 @@ fn at_the_end(stage: &Stage, done: &Done) {
         return;
     }
     if stage.drive.lease().is_none() {
-        // Whom it was released to commands it, and the twin was released to nobody.
-        if done.released {
+        // Whom it was released to commands it, and the twin was released to nobody. Nor did that hear of a reset, so that its panel could
+        // not run it.
+        if done.released || done.reset && seen.local {
             return;
         }
         notes.object(format!("it moves and no lease stands: {seen:?}"));
