@@ -230,6 +230,33 @@ async fn drives_behind_a_gateway_whose_power_comes_back_are_read_again() {
     }
 }
 
+#[tokio::test(start_paused = true)]
+async fn a_stop_of_all_is_repeated_to_who_comes_back_however_many_were_in_vain_before_it() {
+    for habits in kinds() {
+        let plant = plant(habits);
+        let line = plant.line();
+        polled(&line, &[], Instant::now(), Instant::now() + 5 * SECOND).await;
+        plant.drives.iter().for_each(SimSlave::mute);
+        let back = Instant::now() + 60 * SECOND;
+        let mut stops = JoinSet::new();
+        for address in 1..=DRIVES {
+            let mut slave = line.slave(address).with_terms(Terms::of(Class::Stop));
+            stops.spawn(async move { while write(&mut slave, CMD, 0).await.is_err() {} });
+        }
+        sleep_until(back).await;
+        plant.drives.iter().for_each(SimSlave::unmute);
+        stops.join_all().await;
+        let waited: Vec<Duration> =
+            (1..=DRIVES).filter_map(|address| plant.stopped(address)).map(|at| at - back).collect();
+        // One in vain takes the gateway's wait, and the next may wait for four times as long as that.
+        let longest = habits.wait * habits.attempts * 5;
+        assert!(
+            waited.len() == DRIVES.into() && waited.iter().all(|waited| *waited <= longest),
+            "{waited:?}"
+        );
+    }
+}
+
 /// The waits of stops that are given at so many times after three drives have died, by a line that may take two connections.
 async fn waits_with_two(habits: Gateway) -> Vec<Duration> {
     let mut waits = Vec::new();
