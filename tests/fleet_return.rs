@@ -1,17 +1,27 @@
 //! What a drive is away for, and what happens when it is back: somebody else takes control and lets go, a cable is cut and
 //! mended, the power goes and comes. Nothing starts by itself, and a stop that was demanded meanwhile is carried out.
 
-use std::time::Duration;
+use std::{
+    future::ready,
+    sync::{Arc, Mutex},
+    time::Duration,
+};
 
+use drive_bus::Line;
 use drive_core::{Command, Direction, Frequency, StopMode};
 use drive_families::Family;
-use drive_fleet::{EventKind, Link, OnControlTaken, Outcome};
+use drive_fleet::{EventKind, Fleet, Link, OnControlTaken, Outcome};
 use drive_sim::Panel;
 use support::{
     drives,
-    plant::{PATIENCE, Plant},
+    plant::{self, MOTOR, PATIENCE, Plant, Site},
 };
-use tokio::time::{sleep, timeout};
+use tokio::{
+    io::{copy_bidirectional, duplex},
+    spawn,
+    sync::watch,
+    time::{sleep, timeout},
+};
 
 const SECOND: Duration = Duration::from_secs(1);
 
@@ -215,4 +225,71 @@ async fn a_stop_that_was_demanded_while_it_was_away_is_carried_out_when_it_is_ba
         assert!(!plant.machine().observe().running, "{family} {away:?}");
     })
     .await;
+}
+
+/// Two serial servers have exchanged their addresses, or two adapters their names: the port of a line was away for a moment, and
+/// leads to the drive of another line.
+#[tokio::test(start_paused = true)]
+async fn the_drive_of_another_line_that_is_at_the_end_of_one_for_a_moment_lost_is_not_moved() {
+    let sites = ["here", "there"].map(|name| {
+        let settings = plant::controlled(Family::ATV312, name);
+        Site::new(plant::common_settings(), vec![(Family::ATV312, plant::ADDRESS, settings)])
+    });
+    let [here, there] = &sites;
+    let machines = sites.each_ref().map(|site| site.simulated.slave(plant::ADDRESS).expect("it is there"));
+    let text = format!("{} set INV 170", machines[1].name());
+    there.simulated.control(&text).expect("it is another drive");
+    // Where the port leads, and what pulls it out.
+    let leads_to = Arc::new(Mutex::new(here.simulated.clone()));
+    let (pull, pulled) = watch::channel(0_u32);
+    let open = {
+        let leads_to = Arc::clone(&leads_to);
+        move || {
+            let far = leads_to.lock().expect("nobody panics with it").in_memory();
+            let mut pulled = pulled.clone();
+            pulled.mark_unchanged();
+            let (ours, mut end) = duplex(512);
+            spawn(async move {
+                let mut far = far;
+                tokio::select! {
+                    _ = copy_bidirectional(&mut end, &mut far) => {}
+                    _ = pulled.changed() => {}
+                }
+            });
+            ready(Ok(ours))
+        }
+    };
+    let line = Line::over_reopened(open, here.config());
+    let settings = plant::controlled(Family::ATV312, MOTOR);
+    let build = |port, slave| drives::drive(Family::ATV312, port, slave);
+    let fleet = Fleet::builder().line("bench", line.clone()).drive("bench", plant::ADDRESS, settings, build);
+    let fleet = fleet.start().expect("it can be fed");
+    let motor = fleet.drive(MOTOR).expect("it is there");
+    motor.ready(PATIENCE).await.expect("it gets ready");
+    let known = motor.snapshot().identity.clone();
+    let start = async || motor.start_at(Direction::Forward, Frequency::from_hertz(20)).await;
+
+    // The same drive is there again, has said so, and is commanded as before.
+    pull.send_modify(|times| *times += 1);
+    sleep(2 * SECOND).await;
+    let outcome = start().await;
+    assert!(outcome.is_confirmed(), "{outcome}");
+    assert_eq!(motor.snapshot().identity, known);
+    let stopped = motor.stop(StopMode::Ramp).await;
+    assert!(stopped.is_confirmed(), "{stopped}");
+    sleep(5 * SECOND).await;
+
+    *leads_to.lock().expect("nobody panics with it") = there.simulated.clone();
+    pull.send_modify(|times| *times += 1);
+    sleep(SECOND / 100).await;
+    for _ in 0..3 {
+        let outcome = start().await;
+        assert!(matches!(outcome, Outcome::Refused(_)), "{outcome}");
+        sleep(5 * SECOND).await;
+        assert!(!machines[1].observe().running, "another motor runs");
+    }
+    assert_eq!(plant::Plant::writes(&machines[1]), 0);
+    assert_eq!(line.stats().lost, 2);
+    drop(fleet);
+    line.close().await;
 }

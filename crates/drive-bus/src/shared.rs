@@ -50,6 +50,8 @@ pub(crate) struct Shared {
     pub(crate) last: Arc<Last>,
     /// How often the task has come round.
     rounds: AtomicU64,
+    /// How often the port was lost.
+    losses: watch::Sender<u64>,
     /// Tells the task that the master has something new to do.
     pub(crate) wake: Notify,
 }
@@ -61,6 +63,7 @@ impl Shared {
             tap: Mutex::new(None),
             last: Arc::default(),
             rounds: AtomicU64::new(0),
+            losses: watch::Sender::new(0),
             wake: Notify::new(),
         }
     }
@@ -84,6 +87,16 @@ impl Shared {
     /// How often the task has come round.
     pub(crate) fn rounds(&self) -> u64 {
         self.rounds.load(Ordering::Relaxed)
+    }
+
+    /// The port is lost.
+    pub(crate) fn count_loss(&self) {
+        self.losses.send_modify(|losses| *losses += 1);
+    }
+
+    /// How often the port was lost, for who waits for that.
+    pub(crate) fn losses(&self) -> watch::Receiver<u64> {
+        self.losses.subscribe()
     }
 
     fn close(&self) {

@@ -4,7 +4,7 @@ use std::{fmt, io, sync::Arc};
 
 use async_trait::async_trait;
 use drive_core::{Port, PortError, SlaveAddress, Terms};
-use tokio::time::Instant;
+use tokio::{sync::watch, time::Instant};
 use tokio_modbus::{
     ExceptionCode, Request, Response,
     client::{Client, Context},
@@ -83,6 +83,13 @@ impl Slave {
     #[must_use]
     pub fn answered_at(&self) -> Option<Instant> {
         self.handle.shared.master().answered_at(self.address)
+    }
+
+    /// How often its line has lost its port. Behind each loss, however short, another slave may answer: the one that is behind the
+    /// address or the adapter that the port has then.
+    #[must_use]
+    pub fn port_losses(&self) -> watch::Receiver<u64> {
+        self.handle.shared.losses()
     }
 
     /// This slave for somebody who does not know what it is: when it has refused him so often, whatever he asks further counts as

@@ -347,6 +347,7 @@ impl Task {
 
     fn lose(&mut self, reason: &str) {
         let now = Instant::now();
+        self.shared.count_loss();
         self.shared.master().handle_lost(now, reason);
         self.port = if self.backoff > REOPEN_BACKOFF.0 {
             Connection::Waiting(now + self.backoff)

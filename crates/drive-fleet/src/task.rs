@@ -44,6 +44,7 @@ impl Task {
     pub(crate) async fn run(self) {
         let Self { mut drive, mut desk, mut messages, mut urgent, turns, mut keeper, answers } = self;
         let mut open = true;
+        let mut losses = answers.port_losses();
         // Kept across the steps, so that a drive does not lose its place in the row.
         let mut waits_for_turn = None;
         let mut turn: Option<OwnedSemaphorePermit> = None;
@@ -64,6 +65,10 @@ impl Task {
             // The record of an earlier run stays kept until the drive has said whether it is ours.
             if lease.is_some() || !desk.supervisor.is_adopting() {
                 keeper.follow(lease, || desk.supervisor.says_what_it_is());
+            }
+            if losses.has_changed().unwrap_or(false) {
+                losses.mark_unchanged();
+                desk.supervisor.handle_line_lost(Instant::now());
             }
             if let Some(ground) = drive.take_changed() {
                 desk.supervisor.handle_changed(Instant::now(), ground);
@@ -119,6 +124,8 @@ impl Task {
                             continue;
                         }
                     },
+                    // What is left of a call would be sent to whoever answers now.
+                    () = lost(&mut losses) => desk.supervisor.handle_line_lost(Instant::now()),
                     (reply, lease) = &mut call => {
                         // What it says is judged by what stands now.
                         desk.supervisor.handle_lease(lease);
@@ -162,6 +169,14 @@ impl Task {
                 drop(turn.take());
             }
         }
+    }
+}
+
+/// Until the line loses its port.
+async fn lost(losses: &mut watch::Receiver<u64>) {
+    if losses.changed().await.is_err() {
+        // Nobody will tell it any more.
+        std::future::pending().await
     }
 }
 

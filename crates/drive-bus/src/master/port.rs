@@ -2,10 +2,11 @@
 
 use std::mem;
 
-use drive_core::PortError;
+use drive_core::{Class, PortError};
 use tokio::time::Instant;
 
-use super::{Flight, Master};
+use super::{Asked, Flight, Master};
+use crate::schedule::Entry;
 
 /// The state of the port.
 pub(super) enum PortState {
@@ -43,7 +44,8 @@ impl<C> Master<C> {
         self.opened_at.get_or_insert(now);
     }
 
-    /// The port is lost. What waits goes on waiting.
+    /// The port is lost. What waits goes on waiting, but for writes that are no stops: whoever answers over the next port may be
+    /// another than the one for which they were meant.
     pub fn handle_lost(&mut self, now: Instant, reason: &str) {
         tracing::debug!(endpoint = ?self.config.endpoint, reason, "line lost");
         self.port = PortState::Opening(Some(reason.to_owned()));
@@ -54,6 +56,10 @@ impl<C> Master<C> {
         self.end_second(now);
         self.fail_flight(now, reason);
         self.sending = None;
+        let is_for_this = |entry: &Entry<Asked<C>>| entry.work.is_write && entry.terms.class != Class::Stop;
+        for entry in self.schedule.withdraw_all(is_for_this) {
+            self.drop_unsent(entry, PortError::LineDown(reason.to_owned()));
+        }
     }
 
     /// The port cannot be opened. What waits without a lifetime ends; what has one expires.

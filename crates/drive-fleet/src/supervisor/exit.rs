@@ -91,6 +91,15 @@ impl Supervisor {
         }
     }
 
+    /// The watchdog is not put back, if that is under way.
+    pub(super) fn end_restoring(&mut self, why: &'static str) {
+        if let Exit::Restoring { action, .. } = &self.exit {
+            let action = action.clone();
+            self.watchdog_stays(why);
+            self.exit_done(action);
+        }
+    }
+
     /// What is left of the drive to whoever goes on with it.
     pub(crate) fn left(&self) -> Left {
         let is_another = self.checks.is_another();

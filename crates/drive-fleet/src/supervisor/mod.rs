@@ -9,6 +9,7 @@ mod adoption;
 pub(crate) mod checks;
 mod exit;
 mod job;
+mod line_lost;
 mod observe;
 mod orders;
 mod pace;
@@ -183,6 +184,8 @@ pub(crate) struct Supervisor {
     last_error: Option<Error>,
     /// A status has failed since the last that came: the drive may have been switched off and on.
     doubtful: bool,
+    /// Its line has lost its port, and no status was read anew since: another drive may answer.
+    unseen: bool,
     in_flight: Option<Job>,
     /// What the job in flight writes to the EEPROM, if it does, and why.
     wearing: Option<(EepromUse, Cause)>,
@@ -238,6 +241,7 @@ impl Supervisor {
             silent_since: now,
             last_error: None,
             doubtful: false,
+            unseen: false,
             in_flight: None,
             wearing: None,
             turn: Turn::Unwanted,
@@ -306,7 +310,8 @@ impl Supervisor {
         }
         let feed_at = self.checks.feed_at().filter(|_| self.link == Link::Connected);
         let hungry = feed_at.is_some_and(|at| at <= now);
-        let status = (Job::Status { anew: self.doubtful || self.link != Link::Connected }, feed_at);
+        let anew = self.doubtful || self.unseen || self.link != Link::Connected;
+        let status = (Job::Status { anew }, feed_at);
         // A stream of orders must not blind the fleet for the drive that it commands.
         if !hungry && self.pace.status_due() + self.settings.periods.rest <= now {
             return Some(status);
@@ -362,6 +367,10 @@ impl Supervisor {
     }
 
     fn background_job(&self, now: Instant) -> Option<Job> {
+        // What is known of the drive is read anew first, or it would be asked by what another one has said.
+        if self.unseen {
+            return None;
+        }
         if self.explanations > 0 {
             return Some(Job::Faults);
         }
@@ -387,14 +396,14 @@ impl Supervisor {
         if self.link == Link::Connected {
             at = at.min(self.lost_at());
             at = self.checks.feed_at().into_iter().fold(at, Instant::min);
-            if self.turn == Turn::Unwanted {
+            if self.turn == Turn::Unwanted && !self.unseen {
                 at = at.min(self.pace.slow_due());
                 at = self.checks.wake_at().into_iter().fold(at, Instant::min);
             }
         }
         let stop = self.stopping.as_ref().and_then(Stopping::wake_at);
         let order = self.active.as_ref().and_then(Active::wake_at);
-        let withdrawal = self.withdrawal.as_ref().and_then(Withdrawal::wake_at);
+        let withdrawal = self.withdrawal.as_ref().and_then(Withdrawal::wake_at).filter(|_| !self.is_unseen());
         stop.into_iter().chain(order).chain(withdrawal).fold(at, Instant::min).max(now)
     }
 
@@ -426,7 +435,11 @@ impl Supervisor {
             }
         }
         match reply {
-            Reply::Status(result) => self.handle_status(now, result),
+            Reply::Status(result) => {
+                let is_seen = result.is_ok() && matches!(job, Some(Job::Status { anew: true }));
+                self.handle_status(now, result);
+                self.unseen &= !is_seen;
+            }
             Reply::Measurements(result) => self.handle_measurements(now, result),
             Reply::Faults(result) => self.handle_faults(now, result),
             Reply::Identity(result) => {

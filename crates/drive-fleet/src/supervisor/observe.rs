@@ -77,7 +77,8 @@ impl Supervisor {
         let status = Timed::<Status>::new(status, now);
         let silent_for = status.at.saturating_duration_since(self.silent_since);
         // After a silence what it shows was not seen happening.
-        let found = was != Link::Connected || self.doubtful && silent_for >= SWITCHED_OFF;
+        let may_be_another = self.unseen || self.doubtful && silent_for >= SWITCHED_OFF;
+        let found = was != Link::Connected || may_be_another;
         self.words = changed_words(before.as_ref().map(|before| &*before.value), &status.value);
         self.silent_since = self.silent_since.max(status.at);
         self.status = Some(status.clone());
@@ -90,7 +91,7 @@ impl Supervisor {
             self.checks.connected(now);
             self.pace.reconnected(now);
             self.emit_shown(EventKind::Connected(Arc::clone(&status.value)), Cause::Found);
-        } else if self.doubtful && silent_for >= SWITCHED_OFF {
+        } else if may_be_another {
             self.checks.connected(now);
         }
         self.doubtful = false;

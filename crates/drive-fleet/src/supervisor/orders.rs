@@ -67,7 +67,7 @@ impl Active {
     }
 
     /// How it ends when something comes in between.
-    fn ended_by(&self, unsent: Refused, sent: Unconfirmed) -> Outcome {
+    pub(super) fn ended_by(&self, unsent: Refused, sent: Unconfirmed) -> Outcome {
         match &self.phase {
             Phase::Prepare if !self.setpoint_given => Outcome::Refused(unsent),
             _ => Outcome::NotConfirmed(sent),

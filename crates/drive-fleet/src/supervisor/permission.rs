@@ -180,6 +180,7 @@ impl Supervisor {
         }
         let max_age = self.settings.periods.max_age;
         if self.retraction.is_open
+            || crate::mutant!("another-behind-a-lost-line-moved", self.unseen, false)
             || self
                 .status
                 .as_ref()

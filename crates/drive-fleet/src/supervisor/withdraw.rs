@@ -137,7 +137,7 @@ impl Supervisor {
 
     pub(super) fn withdraw_job(&self, now: Instant) -> Option<Job> {
         let due = self.withdrawal.as_ref()?.next_try? <= now;
-        if !due {
+        if !due || self.is_unseen() {
             return None;
         }
         // Nothing is written to a drive of which nobody knows which it is, as long as it has not been asked.

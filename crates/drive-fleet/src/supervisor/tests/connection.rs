@@ -411,3 +411,129 @@ fn a_motor_that_gets_too_hot_is_told_and_told_when_it_is_back() {
         assert_eq!(limits.count(), told, "{percent} %");
     }
 }
+
+/// The same rig with another drive at the end of its line, which was opened again.
+fn exchanged(mut rig: Rig) -> Rig {
+    let identity = Identity { model: Some("two".to_owned()), ..Identity::default() };
+    rig.drive = Paper { identity, ..Paper::new() };
+    line_lost(&mut rig);
+    rig
+}
+
+fn line_lost(rig: &mut Rig) {
+    if rig.machine.handle_line_lost(rig.now) {
+        rig.machine.handle_dropped(rig.now);
+    }
+}
+
+#[test]
+fn another_drive_behind_a_line_that_was_lost_for_a_moment_is_not_moved() {
+    for order in [START, run_at(20), setpoint(20), Order::ResetFaults, Order::Release, Order::Persist] {
+        let mut rig = exchanged(Rig::ready());
+        rig.drive.trip(18);
+        let id = rig.order(order);
+        rig.pass(3_000 * MS);
+        assert_eq!(rig.outcome(id), Some(&Outcome::Refused(Refused::IdentityChanged)), "{order:?}");
+        assert_eq!(rig.drive.writes(), [], "{order:?}");
+        assert!(rig.events().contains(&"identity changed"), "{:?}", rig.events());
+    }
+}
+
+#[test]
+fn behind_a_line_that_was_lost_for_a_moment_a_start_waits_until_the_drive_has_said_that_it_is_the_same() {
+    let mut rig = Rig::ready();
+    rig.order(setpoint(40));
+    rig.pass(500 * MS);
+    rig.drive.log.clear();
+    line_lost(&mut rig);
+    assert_eq!(rig.snapshot().setpoint, None, "another may not have it");
+    let id = rig.order(START);
+    rig.pass(900 * MS);
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed), "{:?}", rig.outcome(id));
+    let start = Job::Start(Direction::Forward);
+    assert_eq!(rig.drive.log[..4], [Job::Status { anew: true }, Job::Identify, Job::Watchdog, start]);
+}
+
+#[test]
+fn a_drive_that_cannot_say_which_it_is_is_read_anew_behind_a_lost_line_and_moved() {
+    let mut rig = Rig::ready();
+    line_lost(&mut rig);
+    let start = rig.order(START);
+    rig.drive.log.clear();
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Status { anew: true }, .. }));
+    let status = rig.drive.answer(Job::Status { anew: true });
+    rig.machine.handle_reply(rig.now, status);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Identify, .. }));
+    let speechless = Error::Unsupported { what: "identity", reason: "it has none" };
+    rig.machine.handle_reply(rig.now, Reply::Identity(Err(speechless)));
+    rig.pass(900 * MS);
+    assert!(rig.outcome(start).is_some_and(Outcome::is_confirmed), "{:?}", rig.outcome(start));
+}
+
+#[test]
+fn nothing_is_sent_while_the_drive_behind_a_lost_line_does_not_answer() {
+    let mut rig = Rig::ready();
+    line_lost(&mut rig);
+    rig.drive.failing = Some(PortError::Timeout { after: 20 * MS });
+    let start = rig.order(START);
+    rig.pass(2_000 * MS);
+    assert!(matches!(rig.outcome(start), Some(Outcome::Refused(_))), "{:?}", rig.outcome(start));
+    assert_eq!(rig.drive.writes(), []);
+    assert!(!rig.drive.log.contains(&Job::Identify), "{:?}", rig.drive.log);
+}
+
+#[test]
+fn a_start_under_way_when_its_line_is_lost_is_dropped_and_taken_back() {
+    let mut rig = Rig::ready();
+    let id = rig.order(START);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Start(_), .. }));
+    assert!(rig.machine.handle_line_lost(rig.now), "the rest of it is not sent");
+    rig.machine.handle_dropped(rig.now);
+    rig.pass(900 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::NotConfirmed(Unconfirmed::Lost)));
+    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)]);
+    let cause = Cause::Policy { policy: Policy::StartNotConfirmed };
+    assert_eq!(rig.cause_of("stop confirmed"), Some(cause));
+}
+
+#[test]
+fn a_start_whose_setpoint_was_given_before_its_line_was_lost_is_over() {
+    let mut rig = Rig::ready();
+    let id = rig.order(run_at(20));
+    while !rig.drive.log.iter().any(|job| matches!(job, Job::SetSetpoint(..))) {
+        rig.pass(MS);
+    }
+    let mut rig = exchanged(rig);
+    rig.pass(1_500 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::NotConfirmed(Unconfirmed::Lost)));
+    assert_eq!(rig.drive.writes(), []);
+}
+
+#[test]
+fn a_stop_goes_on_whatever_answers_behind_a_lost_line() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    let stop = rig.stop(StopMode::Ramp);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    assert!(!rig.machine.handle_line_lost(rig.now));
+    let reply = rig.drive.answer(Job::Stop(StopMode::Ramp));
+    rig.machine.handle_reply(rig.now, reply);
+    rig.pass(1_000 * MS);
+    assert!(rig.outcome(stop).is_some_and(Outcome::is_confirmed));
+    assert!(rig.drive.log.contains(&Job::Identify), "{:?}", rig.drive.log);
+}
+
+#[test]
+fn a_run_command_of_another_drive_behind_a_lost_line_is_not_withdrawn() {
+    let mut rig = Rig::ready();
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    let lease = rig.drive.lease;
+    let mut rig = exchanged(rig);
+    rig.drive.run();
+    rig.drive.lease = lease;
+    rig.drive.says = Some(Verdict::lacks(Lack::Command, ANOTHER_WORD));
+    rig.pass(5_000 * MS);
+    assert_eq!(rig.drive.writes(), []);
+}
