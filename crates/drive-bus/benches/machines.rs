@@ -27,11 +27,15 @@ fn encode(criterion: &mut Criterion) {
 }
 
 fn answer_to(request: &Request<'_>) -> Vec<u8> {
+    answer_of(1, request)
+}
+
+fn answer_of(slave: u8, request: &Request<'_>) -> Vec<u8> {
     let len = answer::likely_len(request);
     let mut pdu = vec![0; len];
     pdu[0] = request.function_code().value();
     pdu[1] = (len - 2) as u8;
-    rtu::frame(1, &pdu).to_vec()
+    rtu::frame(slave, &pdu).to_vec()
 }
 
 fn decode(criterion: &mut Criterion) {
@@ -99,5 +103,34 @@ fn master(criterion: &mut Criterion) {
     });
 }
 
-criterion_group!(machines, encode, decode, schedule, master);
+/// Each of 31 slaves is asked for its status and something of the background all the time, as on a full line.
+fn full_line(criterion: &mut Criterion) {
+    let config = LineConfig { unpaced: true, ..LineConfig::stream(SerialSettings::MODBUS_DEFAULT) };
+    let mut now = Instant::now();
+    let mut master: Master<(u8, Class, u16)> = Master::new(now, config);
+    master.handle_up(now);
+    let ask = |master: &mut Master<_>, now, (slave, class, count)| {
+        let read = Request::ReadHoldingRegisters(3201, count);
+        master.submit(now, slave, read, Terms::of(class).sparing(3), (slave, class, count)).unwrap();
+    };
+    for slave in 1..=31 {
+        ask(&mut master, now, (slave, Class::Status, 2));
+        ask(&mut master, now, (slave, Class::Background, 8));
+    }
+    criterion.bench_function("master: one call of a line whose 31 slaves are asked all the time", |bench| {
+        bench.iter(|| {
+            let sent = master.poll_transmit(now).unwrap();
+            master.handle_sent(now);
+            now += Duration::from_millis(18);
+            let request = Request::ReadHoldingRegisters(3201, u16::from_be_bytes([sent[4], sent[5]]));
+            master.handle_bytes(now, &answer_of(sent[0], &request));
+            let (again, outcome) = master.poll_outcome().unwrap();
+            outcome.unwrap().unwrap();
+            now += Duration::from_millis(2);
+            ask(&mut master, now, again);
+        });
+    });
+}
+
+criterion_group!(machines, encode, decode, schedule, master, full_line);
 criterion_main!(machines);

@@ -15,10 +15,14 @@
 //! - A slave that needs a pause does not hold up the others, except that nothing longer than the pause starts in front
 //!   of a Command.
 
+mod waiting;
+
 use std::{cmp::Reverse, collections::BTreeMap, time::Duration};
 
 use drive_core::{Class, Terms};
 use tokio::time::Instant;
+
+use waiting::Waiting;
 
 /// At most every so-many-th turn goes to what has aged: a stream of commands keeps three quarters of the line.
 const AGED_TURN: u32 = 4;
@@ -75,7 +79,7 @@ pub struct Readiness {
     pub at: Instant,
     /// Expected length of the exchange.
     pub takes: Duration,
-    /// Whether nothing else starts while it waits.
+    /// Whether nothing else starts while it waits. Only a Stop holds a line.
     pub holds_line: bool,
 }
 
@@ -108,8 +112,8 @@ pub struct Schedule<T> {
     round: BTreeMap<Class, u64>,
     since_aged: u32,
     since_background: u32,
-    /// Of each queued entry, while choosing.
-    readiness: Vec<Readiness>,
+    /// Of each queued entry that was asked for it, while choosing.
+    readiness: Vec<Option<Readiness>>,
 }
 
 impl<T> Schedule<T> {
@@ -253,11 +257,13 @@ impl<T> Schedule<T> {
         self.queued.iter().filter_map(Entry::expires).min()
     }
 
-    /// Chooses what is sent next at `now`; `readiness` says when each entry could be.
+    /// Chooses what is sent next at `now`; `readiness` says when each entry could be. It is asked at most once of each, and only of
+    /// those whose turn it would be.
     pub fn choose(&mut self, now: Instant, readiness: impl FnMut(&Entry<T>) -> Readiness) -> Chosen<T> {
-        self.readiness.clear();
-        self.readiness.extend(self.queued.iter().map(readiness));
-        match self.best(now) {
+        let mut waiting = Waiting::new(&self.queued, std::mem::take(&mut self.readiness), readiness);
+        let best = self.best(now, &mut waiting);
+        self.readiness = waiting.end();
+        match best {
             Some(Best::Now(index)) => {
                 self.count_turn(now, index);
                 let entry = self.queued.swap_remove(index);
@@ -270,56 +276,54 @@ impl<T> Schedule<T> {
         }
     }
 
-    fn best(&self, now: Instant) -> Option<Best> {
+    fn best(
+        &self,
+        now: Instant,
+        waiting: &mut Waiting<'_, T, impl FnMut(&Entry<T>) -> Readiness>,
+    ) -> Option<Best> {
         // One caller who asks for one thing after another: nothing to choose from.
-        if let [only] = self.readiness.as_slice() {
-            return Some(if only.at <= now { Best::Now(0) } else { Best::At(only.at) });
+        if let [_] = self.queued.as_slice() {
+            let at = waiting.of(0)?.at;
+            return Some(if at <= now { Best::Now(0) } else { Best::At(at) });
         }
-        let all = || self.queued.iter().zip(&self.readiness).enumerate();
-        let first = |class: Class| {
-            all()
-                .filter(|(_, (entry, readiness))| entry.terms.class == class && readiness.at <= now)
-                .min_by_key(|(_, (entry, _))| entry.rank)
-                .map(|(index, _)| Best::Now(index))
-        };
-        if let Some(stop) = crate::mutant!("stop-waits-its-turn", first(Class::Stop), None) {
-            return Some(stop);
+        let of = |class: Class| move |entry: &Entry<T>| (entry.terms.class == class).then_some(entry.rank);
+        if let Some(stop) = crate::mutant!("stop-waits-its-turn", waiting.first(now, of(Class::Stop)), None) {
+            return Some(Best::Now(stop));
         }
-        let held = self.readiness.iter().filter(|readiness| readiness.holds_line).map(|held| held.at);
-        if let Some(at) = held.min() {
+        let held = waiting.soonest(|entry| entry.terms.class == Class::Stop, |stop| stop.holds_line);
+        if let Some(at) = held {
             return Some(Best::At(at));
         }
         // In front of what has aged, which has its turn behind it: the other way round the twentieth turn would be the twenty-first.
         if self.since_background + 1 >= BACKGROUND_TURN
-            && let Some(background) = first(Class::Background)
+            && let Some(background) = waiting.first(now, of(Class::Background))
         {
-            return Some(background);
+            return Some(Best::Now(background));
         }
         if self.since_aged + 1 >= AGED_TURN
-            && let Some((index, _)) = all()
-                .filter(|(_, (entry, readiness))| self.has_aged(now, entry) && readiness.at <= now)
-                .min_by_key(|(_, (entry, _))| {
-                    (entry.terms.class != Class::KeepAlive, entry.arrived, entry.ticket)
-                })
+            && let Some(aged) = waiting.first(now, |entry| {
+                let order = (entry.terms.class != Class::KeepAlive, entry.arrived, entry.ticket);
+                self.has_aged(now, entry).then_some(order)
+            })
         {
-            return Some(Best::Now(index));
+            return Some(Best::Now(aged));
         }
-        let best = all().filter(|(_, (_, readiness))| readiness.at <= now).min_by_key(|(_, (entry, _))| {
+        let best = waiting.first(now, |entry| {
             let class = crate::mutant!(
                 "stop-waits-its-turn",
                 entry.terms.class,
                 entry.terms.class.min(Class::Command)
             );
-            (Reverse(class), entry.rank)
+            Some((Reverse(class), entry.rank))
         });
-        let Some((index, (entry, readiness))) = best else {
-            return self.readiness.iter().map(|readiness| readiness.at).min().map(Best::At);
+        let Some(index) = best else {
+            return waiting.soonest(|_| true, |_| true).map(Best::At);
         };
         // What would still be on the line when a Command's pause is over does not start in front of it.
-        let command = all().filter(|(_, (entry, _))| entry.terms.class == Class::Command);
-        let command_at = command.map(|(_, (_, readiness))| readiness.at).min();
-        if entry.terms.class < Class::Command
-            && let Some(at) = command_at.filter(|at| *at < now + readiness.takes)
+        let over_at = now + waiting.of(index)?.takes;
+        if self.queued.get(index)?.terms.class < Class::Command
+            && let Some(at) = waiting.soonest(|entry| entry.terms.class == Class::Command, |_| true)
+            && at < over_at
         {
             return Some(Best::At(at));
         }

@@ -171,6 +171,16 @@ fn no_order_of_a_gateway_that_was_a_find_is_one_again() {
         ("Silent", "jcffje", "taken to wait for more than twice as long, behind three stops"),
         ("Silent", "aagiggeeeij", "the same"),
         ("Silent", "fffgjjjee", "the same, of what was given up when all before it was over"),
+        (
+            "Silent",
+            "ffeaefijiijgje",
+            "the same, by what it was asked when all before it was over, and it had been at nothing for two seconds",
+        ),
+        (
+            "Silent",
+            "gfgjfjgffeeifgjgefbee",
+            "the same, by a stop that went out when it had been at nothing for four",
+        ),
         ("Unknown", "ffgbbihgjgijadgj", "the only probe went to a drive that nobody asked for"),
         ("Unknown", "hcdhjgde", "a timeout of a second, learned behind what a lost connection had asked"),
     ] {

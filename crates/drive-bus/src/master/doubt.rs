@@ -214,8 +214,17 @@ impl Doubt {
             let came = same.map(|(order, known)| (known.avoid, order)).max();
             (will_come, self.wait(now, shape), stray, came)
         };
-        let rated = shapes.map(rate).enumerate();
-        rated.min_by_key(|(_, rating)| *rating).map(|(index, (_, wait, ..))| (index, wait))
+        let mut best = None;
+        for (index, rating) in shapes.map(rate).enumerate() {
+            // Of which nothing is known is the best there can be, and nearly always the first.
+            if rating == (None, None, None, None) {
+                return Some((index, None));
+            }
+            if best.is_none_or(|(_, least)| rating < least) {
+                best = Some((index, rating));
+            }
+        }
+        best.map(|(index, (_, wait, ..))| (index, wait))
     }
 
     /// Whether the confirmation of a write with this shape may be that of an earlier one and prove nothing: something else was

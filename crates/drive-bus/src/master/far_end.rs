@@ -9,7 +9,7 @@
 //! - one that **does no more** is asked nothing, until what is owed is over;
 //! - a stop is sent, whatever is owed.
 
-use std::time::Duration;
+use std::{iter, time::Duration};
 
 use tokio::time::Instant;
 
@@ -294,18 +294,16 @@ impl FarEnd {
         // What a lost connection has asked has no number any more, and may look like it.
         let numbered = self.owed.iter().position(|owed| number.is_some() && owed.number == number);
         let at = numbered.or_else(|| self.owed.iter().position(is_it))?;
-        let mut given_up = Vec::new();
-        if self.serves < 2 {
-            // One after another: what was asked before is over too.
-            let before: Vec<_> = self.owed.drain(..at).collect();
-            self.saw(now, before.last().and_then(|last| last.turn));
-            given_up.extend(before.iter().filter_map(Owed::given_up));
-        }
-        let owed = self.owed.remove(if self.serves < 2 { 0 } else { at });
+        // One after another: what was asked before is over too.
+        let before: Vec<_> = self.owed.drain(if self.serves < 2 { ..at } else { ..0 }).collect();
+        let owed = self.owed.remove(at - before.len());
+        let mut given_up: Vec<_> = before.iter().filter_map(Owed::given_up).collect();
+        let mut over = before;
         if nobody {
-            self.saw(now, owed.turn);
             given_up.extend(owed.given_up());
+            over.push(owed);
         }
+        self.saw(now, &over);
         self.unproven = 0;
         self.is_free(now);
         Some(given_up)
@@ -316,9 +314,11 @@ impl FarEnd {
         self.unproven = 0;
         // What it is done with since then had another place.
         let turn = asked.filter(|asked| self.free_from.is_none_or(|free| free <= asked.at));
-        if let Some(turn) = turn.and_then(|asked| asked.place.turn) {
-            self.saw(now, Some(turn));
-        }
+        let waited = turn.and_then(|asked| {
+            let before = self.owed.iter().rev().map(|owed| owed.asked);
+            waited(now, asked.place.turn?, iter::once(asked.at).chain(before))
+        });
+        self.seen = waited.or(self.seen);
         self.is_free(now);
     }
 
@@ -367,24 +367,33 @@ impl FarEnd {
     }
 
     fn done_with_all(&mut self, now: Instant) -> Vec<u8> {
+        let over = std::mem::take(&mut self.owed);
         // What is served side by side shows nothing of how long each is waited for.
-        if let Some(last) = self.owed.last().filter(|_| self.serves < 2) {
-            self.saw(now, last.turn);
+        if self.serves < 2 {
+            self.saw(now, &over);
         }
-        let slaves = self.owed.drain(..).filter_map(|owed| owed.given_up()).collect();
         self.is_free(now);
-        slaves
+        over.iter().filter_map(Owed::given_up).collect()
     }
 
-    /// The question of this turn was over at `now`, for want of an answer, and so was what stood before it.
-    fn saw(&mut self, now: Instant, turn: Option<Turn>) {
-        let Some(Turn { free_from, place }) = turn else { return };
-        let waits = crate::mutant!("far-end-waits-for-one", place.max(1), 1);
-        let waited = now.saturating_duration_since(free_from) / waits;
-        if waited > Duration::ZERO {
-            self.seen = Some(waited);
-        }
+    /// The last of these was over at `now`, for want of an answer, and so were those before it.
+    fn saw(&mut self, now: Instant, over: &[Owed]) {
+        let turn = over.last().and_then(|last| last.turn);
+        let asked = over.iter().rev().map(|owed| owed.asked);
+        self.seen = turn.and_then(|turn| waited(now, turn, asked)).or(self.seen);
     }
+}
+
+/// How long a far end waits for each that was done at `now` with the question of this turn. `asked`: when that was asked, and those
+/// before it, the latest first. Between two it may have been at nothing, so that all of them together show less than the last few:
+/// what was asked since then was waited for since then, and no longer.
+fn waited(now: Instant, turn: Turn, asked: impl Iterator<Item = Instant>) -> Option<Duration> {
+    let last_few = (1..turn.place).zip(asked);
+    let each = last_few.chain([(turn.place, turn.free_from)]).map(|(places, since)| {
+        let waits = crate::mutant!("far-end-waits-for-one", places.max(1), 1);
+        now.saturating_duration_since(since) / waits
+    });
+    each.min().filter(|waited| *waited > Duration::ZERO)
 }
 
 #[cfg(test)]
@@ -537,6 +546,34 @@ mod tests {
         far.owe(behind);
         // Two seconds are over: both were waited for.
         assert_eq!(far.answered(now + 2 * SECOND, 1, false), [4]);
+        assert_eq!(far.wait(), SECOND);
+    }
+
+    #[test]
+    fn a_far_end_that_was_at_nothing_between_two_questions_in_vain_has_not_waited_meanwhile() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
+        // Nothing proves that it is done with what it says nothing of, so that the third is expected for five seconds.
+        owe(&mut far, 1, 1, now);
+        assert_eq!(far.expired(now + 2 * SECOND), [1]);
+        owe(&mut far, 1, 2, now + 2 * SECOND);
+        assert_eq!(far.expired(now + 5 * SECOND), [1]);
+        owe(&mut far, 1, 3, now + 5 * SECOND);
+        // Stops that are sent all the same when it has done nothing for more than three seconds.
+        owe(&mut far, 1, 4, now + 9_500 * MS);
+        owe(&mut far, 2, 5, now + 9_800 * MS);
+        assert_eq!(far.heard(now + 10_500 * MS, 2, Some(5), Shape::ANY, false), Some(vec![1, 1]));
+        assert_eq!(far.wait(), SECOND);
+    }
+
+    #[test]
+    fn what_was_asked_when_all_before_it_was_over_has_waited_for_itself_alone() {
+        let now = Instant::now();
+        let mut far = FarEnd::new(Some(Gateway { at_once: Some(1), wait: Some(SECOND) }));
+        owe(&mut far, 1, 1, now);
+        // It is still owed, as nobody has looked since then.
+        let third = asked(&far, 3, 2, now + 4 * SECOND);
+        far.nobody_answered(now + 5 * SECOND, Some(third));
         assert_eq!(far.wait(), SECOND);
     }
 

@@ -51,8 +51,9 @@ impl<C> Waits<'_, C> {
                 .then(|| shape_of(self.exchange, &station.harmless_read()));
             station.place(now, entry).1.max(read.and_then(|read| station.doubt.wait(now, read)))
         });
-        let share = self.offline.stop_at(entry.slave).filter(|_| is_stop);
-        let gate = self.far_end.gate(self.proves_something(entry)).filter(|_| !goes_at_once);
+        let share = if is_stop { self.offline.stop_at(entry.slave) } else { None };
+        let owes = !goes_at_once && self.far_end.owes() > 0;
+        let gate = if owes { self.far_end.gate(self.proves_something(entry)) } else { None };
         let second = self.second.holds(entry.slave).filter(|_| entry.work.is_write && !is_stop);
         aside.max(doubt).max(share).max(gate).max(second).filter(|until| *until > now)
     }
@@ -69,9 +70,11 @@ impl<C> Waits<'_, C> {
     /// Whether its answer would say something of the far end: it is a read of a drive that answers, or of any if none does.
     fn proves_something(&self, entry: &Entry<Asked<C>>) -> bool {
         let answers = |slave: u8, station: &Station| station.is_answering() && !self.offline.contains(slave);
-        let may_answer = self.stations.get(&entry.slave).is_some_and(|station| answers(entry.slave, station))
-            || !self.stations.iter().any(|(slave, station)| answers(*slave, station));
-        self.far_end.owes() > 0 && !entry.work.is_write && may_answer
+        let may_answer = || {
+            self.stations.get(&entry.slave).is_some_and(|station| answers(entry.slave, station))
+                || !self.stations.iter().any(|(slave, station)| answers(*slave, station))
+        };
+        !entry.work.is_write && may_answer()
     }
 }
 

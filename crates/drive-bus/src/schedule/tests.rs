@@ -193,6 +193,36 @@ fn nothing_starts_while_a_stop_holds_the_line_for_its_slaves_pause() {
 }
 
 #[test]
+fn when_it_could_be_sent_is_asked_once_of_each_and_only_of_what_may_be_chosen() {
+    let (mut schedule, now) = (schedule(), Instant::now());
+    (1..=31).for_each(|slave| push(&mut schedule, now, slave, Terms::of(Class::Status), 0));
+    (1..=31).for_each(|slave| push(&mut schedule, now, slave, Terms::of(Class::Background), 1));
+    let mut asked = Vec::new();
+    let mut choose = |ready: fn(u8) -> bool| {
+        asked.clear();
+        let chosen = schedule.choose(now, |entry| {
+            asked.push(entry.ticket);
+            let at = if ready(entry.slave) { now } else { now + 5 * MS };
+            Readiness { at, takes: 20 * MS, holds_line: false }
+        });
+        if let Chosen::Send(entry) = chosen {
+            schedule.put_back(entry);
+        }
+        let times = asked.len();
+        asked.sort_unstable();
+        asked.dedup();
+        (times, asked.len())
+    };
+    assert_eq!(choose(|_| true), (1, 1), "the first goes");
+    assert_eq!(
+        choose(|slave| slave > 3),
+        (5, 5),
+        "three have their pauses, and one of the background was the first that was looked at"
+    );
+    assert_eq!(choose(|_| false), (62, 62), "all have");
+}
+
+#[test]
 fn a_stream_of_setpoints_keeps_the_place_of_the_first() {
     let (mut schedule, now) = (schedule(), Instant::now());
     let setpoint = Terms::of(Class::Command).replacing(8502);
