@@ -137,3 +137,73 @@ fn after_one_late_answer_what_cannot_differ_waits_for_nothing() {
     let exchange = SERIAL.characters(8 + 7) + support::by_hand::RESPONSE + SERIAL.t3_5();
     assert!(line.now - begun <= exchange * 16 + MS, "{:?}", line.now - begun);
 }
+
+const ONE_WORD: Request<'static> = Request::ReadHoldingRegisters(3201, 1);
+
+/// A line whose far end may answer at once, with a question in vain whose late window is over.
+fn after_a_question_in_vain() -> (ByHand, u8) {
+    let config = LineConfig { retries: 0, far_end_paces: Some(false), ..LineConfig::stream(SERIAL) };
+    let mut line = ByHand::new(config);
+    line.ask(0, 1, ONE_WORD, Terms::default());
+    let request = line.sent();
+    let until = line.now + 2_000 * MS;
+    assert_eq!(line.next_sent(until), None);
+    line.now = until;
+    assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
+    (line, request[0])
+}
+
+#[test]
+fn an_answer_that_was_kept_until_the_next_question_is_not_that_to_it() {
+    let (mut line, slave) = after_a_question_in_vain();
+    for (caller, (late, right)) in [(2, 25_600), (2, 25_601)].into_iter().enumerate() {
+        let word = |word: u16| rtu::frame(slave, &[&[3, 2][..], &word.to_be_bytes()].concat());
+        line.ask(caller as u32 + 1, 1, ONE_WORD, Terms::default());
+        line.sent();
+        line.hears(9 * MS, &word(late));
+        assert_eq!(line.ended(), None, "nobody is told");
+        line.hears(15 * MS, &word(right));
+        line.sent();
+        line.hears(15 * MS, &word(right));
+        let (_, outcome) = line.ended().expect("it is asked again and answered");
+        let told = outcome.unwrap().unwrap();
+        assert_eq!(told, tokio_modbus::Response::ReadHoldingRegisters(vec![right]));
+        // The next is in vain once more.
+        line.now += 60 * MS;
+        line.ask(9, 1, ONE_WORD, Terms::default());
+        line.sent();
+        let until = line.now + 2_000 * MS;
+        assert_eq!(line.next_sent(until), None);
+        line.now = until;
+        assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
+    }
+}
+
+#[test]
+fn where_the_kept_answer_never_comes_a_question_is_asked_twice_once() {
+    let (mut line, slave) = after_a_question_in_vain();
+    let right = rtu::frame(slave, &[3, 2, 0, 7]);
+    for (caller, questions) in [(1, 2), (2, 1), (3, 1)] {
+        line.ask(caller, 1, ONE_WORD, Terms::default());
+        for question in 1..=questions {
+            assert_eq!(line.ended(), None, "question {question} of {caller}");
+            line.sent();
+            line.hears(15 * MS, &right);
+        }
+        assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_ok()), "{caller}");
+    }
+}
+
+#[test]
+fn what_comes_once_more_though_it_was_owed_withdraws_what_was_taken_instead() {
+    let (mut line, slave) = after_a_question_in_vain();
+    line.ask(1, 1, ONE_WORD, Terms::default());
+    line.sent();
+    line.hears(15 * MS, &rtu::frame(slave, &[3, 2, 0, 7]));
+    line.sent();
+    line.hears(15 * MS, &rtu::frame(slave, &[3, 2, 0, 7]));
+    assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_ok()));
+    assert_eq!(line.master.stats(line.now).slaves[&1].retracted, 0);
+    line.hears(100 * MS, &rtu::frame(slave, &[3, 2, 0, 8]));
+    assert_eq!(line.master.stats(line.now).slaves[&1].retracted, 1);
+}

@@ -69,6 +69,8 @@ struct Known {
     stray: bool,
     /// Such an answer is owed and has not come.
     owed: bool,
+    /// It is not kept until the next question: a later answer has come, or one was thrown away that may have been this one.
+    asked_again: bool,
     /// A check over the write that it confirms, of which the confirmation of some writes repeats no value. `None`: it confirms none,
     /// or its slave has answered something behind its time, so that it hardly comes any more.
     wrote: Option<u16>,
@@ -98,6 +100,7 @@ impl Doubt {
             will_come: true,
             stray: false,
             owed: true,
+            asked_again: false,
             wrote,
             overtaken: false,
             over_a_lost_port,
@@ -112,6 +115,7 @@ impl Doubt {
             known.owed && !is_request && (known.shape == shape || shape.is_refusal_of(known.shape))
         };
         let was_owed = self.known.iter().any(is_it);
+        let may_be_anothers = self.known.iter().any(|known| is_it(known) && known.asked_again);
         if let Some(index) = self.known.iter().position(|known| is_it(known) && !known.over_a_lost_port) {
             // What was waited for has come: one thing less to be afraid of.
             self.known.remove(index);
@@ -121,15 +125,17 @@ impl Doubt {
             let stray = !was_owed && self.is_no_double(now, frame);
             self.remember(Known { will_come: is_request, stray, ..heard });
         }
-        if was_owed {
-            return Heard { was_owed, ..Heard::default() };
-        }
-        self.unexplained_until = Some(now + MEMORY);
         let taken = self.taken.filter(|taken| {
             !is_request
                 && taken.frame.shape == shape
                 && now.saturating_duration_since(taken.at) <= LONGEST_DOUBLE
         });
+        if was_owed {
+            // Which of the two was owed nobody knows.
+            let taken = taken.filter(|taken| may_be_anothers && taken.frame.check != frame.check);
+            return Heard { was_owed, withdraws: taken.map(|taken| taken.asked_at), ..Heard::default() };
+        }
+        self.unexplained_until = Some(now + MEMORY);
         let Some(taken) = taken else { return Heard::default() };
         let same = taken.frame.check == frame.check;
         Heard {
@@ -245,6 +251,26 @@ impl Doubt {
         }
     }
 
+    /// Whether the answer to a read that has this shape may be one that is owed, however late, and none was thrown away for that yet.
+    pub(super) fn may_be_late(&self, now: Instant, shape: Shape) -> bool {
+        let mut owed = self.known.iter().filter(|known| known.owed && known.avoid > now);
+        owed.any(|known| known.shape == shape && !known.asked_again)
+    }
+
+    /// An answer of this shape was thrown away, because it may have been one that is owed: the right one may come until `until`.
+    pub(super) fn threw_away(&mut self, now: Instant, shape: Shape, until: Instant) {
+        self.owe(now, shape, None, until, false);
+        self.is_in_step();
+        self.taken = None;
+    }
+
+    /// No answer needs to be thrown away for what is owed: a later one has come, so that none is kept until the next question.
+    pub(super) fn is_in_step(&mut self) {
+        for known in &mut self.known {
+            known.asked_again = true;
+        }
+    }
+
     /// Whether the refusal of what has this shape may be that of an earlier request.
     pub(super) fn owes_refusal(&self, now: Instant, shape: Shape) -> bool {
         self.owed(now).any(|known| known.shape.shares_refusals_with(shape))
@@ -285,6 +311,7 @@ impl Known {
             will_come: false,
             stray: false,
             owed: false,
+            asked_again: false,
             wrote: None,
             overtaken: false,
             over_a_lost_port: false,

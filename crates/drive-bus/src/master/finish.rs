@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use drive_core::{Class, Effect, PortError};
 use tokio::time::Instant;
+use tokio_modbus::Request;
 
 use super::{Asked, Flight, Master, Purpose, port::PortState, probing::Question};
 use crate::{
@@ -32,6 +33,10 @@ impl<C> Master<C> {
         }
         let result = self.believe(now, &flight, result);
         let (result, nobody) = self.gateway_says(now, &flight, result);
+        let may_be_late = self.may_be_late(now, &flight, &result);
+        if may_be_late && matches!(flight.purpose, Purpose::Call(_)) {
+            return self.ask_again(now, flight, &result);
+        }
         self.record.ended(now, slave, flight.started, Ending::of(&result));
         let expected = answer::likely_len(&flight.request);
         let ended = match &result {
@@ -47,6 +52,10 @@ impl<C> Master<C> {
         match &result {
             Ok(answer) => self.note_answer(now, &flight, answer),
             Err(failure) => self.note_failure(now, &flight, failure),
+        }
+        if may_be_late {
+            // A probe's own answer may still come too.
+            self.throw_away_for(now, &flight);
         }
         if nobody {
             self.nobody_answered(now, vec![slave]);
@@ -108,10 +117,60 @@ impl<C> Master<C> {
         self.record.ended(now, flight.slave, flight.started, Ending::of(result));
         self.stats.busy += now.saturating_duration_since(flight.started) + self.config.silence();
         self.fear_late_answer(now, flight);
+        if result.is_ok() {
+            self.station(flight.slave).doubt.is_in_step();
+        }
         if *result == Err(Failure::Timeout) {
             self.owe(flight);
         }
         self.thrown_away(now);
+    }
+
+    /// Whether it may be the answer to an earlier question that looks the same, and that was never heard: the far end may have kept it
+    /// until this question came.
+    fn may_be_late(&self, now: Instant, flight: &Flight<C>, result: &Result<Answer, Failure>) -> bool {
+        let is_read = matches!(
+            *flight.request,
+            Request::ReadCoils(..)
+                | Request::ReadDiscreteInputs(..)
+                | Request::ReadHoldingRegisters(..)
+                | Request::ReadInputRegisters(..)
+        );
+        let station = self.stations.get(&flight.slave).filter(|_| is_read && matches!(result, Ok(Ok(_))));
+        let may_be = station.is_some_and(|station| station.doubt.may_be_late(now, flight.shape));
+        may_be && self.exchange.confuses_late_answers()
+    }
+
+    /// The answer is nobody's, and the question asked again once its own could have come.
+    fn ask_again(&mut self, now: Instant, flight: Flight<C>, result: &Result<Answer, Failure>) {
+        let slave = flight.slave;
+        self.record.ended(now, slave, flight.started, Ending::of(result));
+        let expected = answer::likely_len(&flight.request);
+        let is_rtu = self.config.protocol == Protocol::Rtu;
+        self.evidence.ended(now, (Over::First, slave), is_rtu, Ended::Unclear, expected);
+        let took = now.saturating_duration_since(flight.started);
+        self.stats.busy += took + self.config.silence();
+        let station = self.station(slave);
+        station.stats.exchanges.record(took);
+        station.stats.outcomes.mismatches += 1;
+        self.throw_away_for(now, &flight);
+        self.note_alive(now, slave);
+        match flight.purpose {
+            Purpose::Call(Some(mut entry)) => {
+                let why = "the answer may be that to an earlier request".to_owned();
+                entry.work.last = Some(PortError::Mismatch(why));
+                // Longer it may have been refused before.
+                entry.work.asked_longer = true;
+                self.schedule.put_back(entry);
+            }
+            _ => self.station(slave).stats.outcomes.withdrawn += 1,
+        }
+    }
+
+    /// What has come counts as what was owed; that to this question may still come.
+    fn throw_away_for(&mut self, now: Instant, flight: &Flight<C>) {
+        let until = now + flight.patience.max(config::DOUBLE);
+        self.station(flight.slave).doubt.threw_away(now, flight.shape, until);
     }
 
     /// What the exchange brought, as far as it proves itself. Where it does not, its own answer may still come.
@@ -186,6 +245,7 @@ impl<C> Master<C> {
         self.nobody_answered(now, given_up);
         self.second.settled(now, flight.slave, flight.asked_at);
         let station = self.station(flight.slave);
+        station.doubt.is_in_step();
         station.answered_at = Some(flight.asked_at);
         // What has waited behind what was owed says nothing of its slave.
         if let Some(sent) = flight.sent.filter(|_| at_once) {
@@ -241,6 +301,7 @@ impl<C> Master<C> {
                 // It may come once more, whole.
                 let again = if self.far_end_paces { config::DOUBLE } else { self.config.late_window };
                 station.doubt.owe(now, flight.shape, flight.wrote, now + again, false);
+                station.doubt.is_in_step();
                 return;
             }
             // It answers, and its next exchange will prove something.
@@ -301,6 +362,10 @@ impl<C> Master<C> {
         let from = if flight.stalled { now } else { sent };
         let doubt = &mut self.station(flight.slave).doubt;
         doubt.owe(now, flight.shape, flight.wrote, from + window, lost);
+        if lost {
+            // The first answer over the next port is thrown away for all of them.
+            doubt.is_in_step();
+        }
         if flight.stalled {
             doubt.hold(now, from + window);
         }
