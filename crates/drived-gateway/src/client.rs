@@ -97,6 +97,7 @@ async fn read(
                 Err(_) => return Some(Ended::Malformed),
             };
             desk.clients.hear(peer, arrived);
+            desk.plant.watched().hear(&desk.config.name, peer, arrived);
             place.hear(arrived);
             let Frame { transaction, unit, .. } = frame;
             let asked = desk.look_at(arrived, &frame);

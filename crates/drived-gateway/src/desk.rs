@@ -23,7 +23,7 @@ use tokio::{
     time::{Instant, sleep_until, timeout_at},
 };
 
-pub(crate) use self::writes::Stop;
+pub(crate) use self::writes::{Stop, watched};
 use super::{
     clients::Clients,
     counters::{Counters, Result as Counted},

@@ -60,6 +60,8 @@ impl Gateways {
         let desk =
             |config: &GatewayConfig| Desk::new(config.clone(), plant.clone(), audit.clone(), names.clone());
         let desks: Vec<_> = gateways.iter().map(desk).collect();
+        // Before anybody is heard by one of them.
+        plant.watched().set_doors(&gateways.iter().map(desk::watched).collect::<Vec<_>>());
         let open = |desk: Arc<Desk>| {
             let mut ended = ended.clone();
             if desk.config.virtual_unit.is_some() {
@@ -71,18 +73,11 @@ impl Gateways {
                     _ = ended.changed() => return,
                 };
                 tracing::info!("gateway {} is at {}", desk.config.name, desk.config.listen);
-                tokio::join!(accept_all(&listener, &desk, ended.clone()), until(desk.watch_silence(), ended));
+                accept_all(&listener, &desk, ended).await;
             })
         };
         let doors = desks.iter().cloned().map(open).collect();
         Self { end, desks, doors }
-    }
-}
-
-async fn until(work: impl Future<Output = ()>, mut ended: watch::Receiver<bool>) {
-    tokio::select! {
-        () = work => {}
-        _ = ended.changed() => {}
     }
 }
 

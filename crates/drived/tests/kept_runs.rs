@@ -4,7 +4,13 @@
 
 mod support;
 
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    io::{Read as _, Write as _},
+    net::{TcpListener, TcpStream},
+    path::PathBuf,
+    time::Duration,
+};
 
 use support::{File, Running, Sim, path, run};
 
@@ -126,4 +132,78 @@ fn a_reload_that_gives_a_turning_drive_and_its_line_another_name_leaves_its_run_
     let (code, rest) = daemon.interrupt();
     assert_eq!(code, Some(0), "{rest}");
     assert!(!plant.shown().contains("running"), "our run is stopped at the exit: {rest}");
+}
+
+/// A client of a gateway, which has to be heard every three seconds.
+struct Client(TcpStream);
+
+impl Client {
+    /// Gives the plant a gateway, and a daemon, and has the motor run forward by a client.
+    fn of(plant: &Plant) -> (Running, Self) {
+        // Free now, and hardly anybody's a moment later.
+        let free = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr()).expect("a port");
+        let text = fs::read_to_string(plant.file.path()).expect("it is there");
+        let text = format!(
+            "{text}on_exit = \"leave\"\n[[gateways]]\nname = \"scada\"\nlisten = \"{free}\"\nline = \"bench\"\nwrites = \"operate\"\n\
+             patience = \"20s\"\nclient_timeout = \"3s\"\non_client_silence = \"stop\"\n"
+        );
+        fs::write(plant.file.path(), &text).expect("it can be written");
+        let mut daemon = plant.daemon();
+        daemon.wait_for(r#""event":"identified""#);
+        let stream = TcpStream::connect(free).expect("it listens");
+        // So that a test that fails ends.
+        stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a time-out can be set");
+        let mut client = Self(stream);
+        // CMD and LFr: BBV51701 p. 19.
+        for (register, word) in [(8_501, 6), (8_502, 200), (8_501, 15)] {
+            client.write(register, word);
+        }
+        let shown = run(&["status", "pump", "--socket", &plant.socket]);
+        assert!(shown.out.contains("running"), "{}", shown.out);
+        (daemon, client)
+    }
+
+    fn write(&mut self, register: u16, word: u16) {
+        let [register, word] = [register, word].map(u16::to_be_bytes);
+        let request = [&[0x15, 1, 0, 0, 0, 6, 1, 6][..], &register, &word].concat();
+        self.0.write_all(&request).expect("it is taken");
+        let mut answer = [0; 12];
+        self.0.read_exact(&mut answer[..9]).expect("it is answered");
+        assert_eq!(answer[..8], request[..8], "{answer:02X?}");
+        self.0.read_exact(&mut answer[9..]).expect("it is answered");
+    }
+}
+
+#[test]
+fn a_motor_of_a_client_that_has_to_be_heard_is_stopped_after_a_kill_when_the_client_stays_away() {
+    let plant = Plant::new("kept-client");
+    let (mut daemon, _client) = Client::of(&plant);
+    daemon.signal("-KILL");
+    assert_eq!(daemon.end().0, None);
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"run_adopted""#);
+    daemon.wait_for(r#""event":"stop_confirmed""#);
+    let (code, rest) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(!plant.shown().contains("running"), "and not by the exit, which leaves it: {}", plant.shown());
+}
+
+#[test]
+fn a_motor_of_a_client_that_has_to_be_heard_is_stopped_when_line_drive_and_gateway_get_other_names() {
+    for names in [
+        &[("\"pump\"", "\"fan\"")][..],
+        &[("\"scada\"", "\"desk\"")],
+        &[("bench", "hall"), ("\"pump\"", "\"fan\""), ("\"scada\"", "\"desk\"")],
+    ] {
+        let plant = Plant::new("kept-client-renamed");
+        let (mut daemon, _client) = Client::of(&plant);
+        let text = fs::read_to_string(plant.file.path()).expect("it is there");
+        let renamed = names.iter().fold(text, |text, (old, new)| text.replace(old, new));
+        fs::write(plant.file.path(), &renamed).expect("it can be written");
+        daemon.signal("-HUP");
+        daemon.wait_for(r#""event":"stop_confirmed""#);
+        let (code, rest) = daemon.interrupt();
+        assert_eq!(code, Some(0), "{rest}");
+        assert!(!plant.shown().contains("running"), "{names:?}: {}", plant.shown());
+    }
 }

@@ -36,6 +36,7 @@ use drived_config::{
     config::{Group, LinePart, add},
     names::{self, Names, PLACES, Told},
     records::{self, Records, in_folder},
+    rights::Caller,
 };
 use drived_doors::{
     config::Http,
@@ -53,7 +54,7 @@ use drived_http::{
 use drived_plant::{
     counts::Source,
     findings, journal,
-    plant::{Plant, alarms::KeptAlarms},
+    plant::{Plant, alarms::KeptAlarms, watched::Watched},
 };
 use drived_screen::screen::Screen;
 use drived_words::{
@@ -116,6 +117,8 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let (tell_runs, told_runs) = mpsc::unbounded_channel();
     let builder = build(&config, &lines, before).keep_runs(tell_runs);
     let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
+    // Nobody is watched any more for a run that was ended.
+    let watched = Watched::in_folder(state.folder.as_deref(), |drive| started.of(drive).is_some());
     let kept = runs::follow(started, told_runs);
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
     let with_table = !args.json && logging::may_be_shown();
@@ -133,8 +136,9 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let names = Names::in_folder(config.doors.state.folder.as_deref());
     tell_names(&names, &config.lines, &config.groups);
     let alarms = KeptAlarms::in_folder(state.folder.as_deref());
-    let plant = Plant::start_with(fleet.clone(), config.groups.clone(), false, &alarms);
+    let plant = Plant::start_with(fleet.clone(), config.groups.clone(), false, &alarms, watched);
     plant.set_names(names.clone());
+    let watched = plant.keep_watched();
     let alarms = plant.keep_alarms(alarms);
     plant.set_options(options(&config.lines));
     let opened = Opened::default();
@@ -143,6 +147,13 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let by_profile = tokio::spawn(by_profile);
     let known = names.clone();
     let faces = Faces::open(faces, Surroundings::new(plant.clone(), doors.audit(), names.clone()));
+    let silences = {
+        let audit = doors.audit();
+        let record = move |caller: &Caller, what| {
+            audit.record(Record::new(Kind::Command, caller, what)).whenever();
+        };
+        tokio::spawn(plant.clone().follow_watched(record))
+    };
     let shutdown = config.shutdown;
     let beginning = config.lines.is_empty().then(|| args.config.clone());
     let reloader =
@@ -187,6 +198,9 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     }
     drop(watching);
     findings.abort();
+    // What becomes of the motors is a matter of the exit's policies, and whose they were is kept as it was.
+    silences.abort();
+    watched.abort();
     first_hour.cancel();
     // What becomes of the motors is told in words.
     let screen = OptionFuture::from(screen.map(Screen::close));

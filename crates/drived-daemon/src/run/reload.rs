@@ -8,7 +8,7 @@ use std::{
 };
 
 use drive_bus::{Endpoint, Line};
-use drive_fleet::{Fleet, FleetError, Left, LineBudget};
+use drive_fleet::{DriveHandle, FleetError, Left, LineBudget};
 use drived_words::closing;
 use tokio::{sync::Mutex, time::Instant};
 
@@ -27,7 +27,7 @@ use drived_file::{Config, is_one_wire};
 use drived_http::api::Reload;
 use drived_plant::{
     counts::{Id, Samples, Source},
-    plant::{Plant, views::NoticeView},
+    plant::{Plant, views::NoticeView, watched::Watch},
 };
 use drived_words::{drive_spec::DriveName, failure::Failure, json::unix};
 
@@ -128,10 +128,13 @@ impl Reloader {
         let gone = places(config).filter(|(name, _)| leaving.contains(name)).filter_map(handle);
         let gone: Vec<_> = gone.collect();
         let actions = fleet.remove(&leaving, config.shutdown).await;
+        // Whoever has to be heard goes with the motor that he has started and that was left turning.
+        let gone: Vec<_> =
+            gone.into_iter().map(|(place, handle)| Leaving::of(plant, place, &handle)).collect();
         let mut leavings =
             std::mem::take(&mut *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner));
-        leavings.retain(|(left, _)| gone.iter().all(|(place, _)| place != left));
-        leavings.extend(gone.into_iter().map(|(place, handle)| (place, handle.left())));
+        leavings.retain(|before| gone.iter().all(|leaving| leaving.place != before.place));
+        leavings.extend(gone);
         let turning = actions.iter().filter(|(_, action)| action.is_alarm());
         let turning: Vec<String> = turning.map(|(name, action)| format!("{name}: {action}")).collect();
         for name in changes.iter().filter_map(Change::closed_line) {
@@ -151,7 +154,7 @@ impl Reloader {
         super::tell_names(&self.0.names, &new.lines, &config.groups);
         // Nobody asks for a drive that is not there yet.
         plant.set_options(super::options(&new.lines));
-        let made = add_all(&fleet, &changes, &new, &lines, &mut leavings)
+        let made = add_all(plant, &changes, &new, &lines, &mut leavings)
             .map(|()| settle(plant, config, &mut new, &changes));
         *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner) = leavings;
         // Also where nothing has changed: what is kept may have been mended.
@@ -378,13 +381,13 @@ fn may_turn(turning: &[String]) -> String {
 
 /// Adds lines and drives, all of them or none.
 fn add_all(
-    fleet: &Fleet,
+    plant: &Plant,
     changes: &[Change],
     new: &Config,
     lines: &[(String, LineBudget, Line)],
     leavings: &mut Leavings,
 ) -> Result<(), FleetError> {
-    fleet.extend(|mut builder| {
+    plant.fleet().extend(|mut builder| {
         for (name, budget, line) in lines {
             builder = builder.line_with(&**name, line.clone(), |_| *budget);
         }
@@ -393,7 +396,7 @@ fn add_all(
                 changes.iter().any(|change| change.added_drive() == Some(&*drive.settings.name))
             };
             builder = part.drives.iter().filter(is_added).fold(builder, |builder, drive| {
-                let left = taken(leavings, new, &drive.settings.name);
+                let left = taken(leavings, plant, new, &drive.settings.name);
                 add(builder, part, drive, left)
             });
         }
@@ -477,14 +480,36 @@ fn places(config: &Config) -> impl Iterator<Item = (&str, Place)> {
     })
 }
 
+/// What is left of a drive that is not in the fleet any more.
+struct Leaving {
+    place: Place,
+    left: Left,
+    /// Over who has started its motor, where that was left turning.
+    watch: Option<Watch>,
+}
+
+impl Leaving {
+    fn of(plant: &Plant, place: Place, drive: &DriveHandle) -> Self {
+        let (left, watch) = (drive.left(), plant.watched().take(drive.name()));
+        let watch = watch.filter(|_| left.run.is_some());
+        Self { place, left, watch }
+    }
+}
+
 /// What is left of drives that are not in the fleet any more, for when they are taken up again, by whatever name.
-type Leavings = Vec<(Place, Left)>;
+type Leavings = Vec<Leaving>;
 
 /// Takes what is left of a drive.
-fn taken(leavings: &mut Leavings, config: &Config, name: &str) -> Left {
+fn taken(leavings: &mut Leavings, plant: &Plant, config: &Config, name: &str) -> Left {
     let place = places(config).find_map(|(other, place)| (other == name).then_some(place));
-    let at = leavings.iter().position(|(left, _)| Some(left) == place.as_ref());
-    at.map(|at| leavings.swap_remove(at).1).unwrap_or_default()
+    let at = leavings.iter().position(|leaving| Some(&leaving.place) == place.as_ref());
+    let Some(Leaving { left, watch, .. }) = at.map(|at| leavings.swap_remove(at)) else {
+        return Left::default();
+    };
+    if let Some(watch) = watch {
+        plant.watched().put(name, watch);
+    }
+    left
 }
 
 #[cfg(test)]

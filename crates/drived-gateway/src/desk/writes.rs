@@ -1,6 +1,6 @@
 //! Writes: judged as commands of the fleet are, carried out by it, and confirmed once they are in force.
 
-use std::{net::IpAddr, time::Duration};
+use std::net::IpAddr;
 
 use drive_core::{
     Class, Direction, Drive, Error, Intent, Row, Setpoint, StopMode, Terms, tokio_modbus::ExceptionCode,
@@ -11,7 +11,7 @@ use futures_util::{FutureExt as _, future::join_all};
 use tokio::time::{Instant, timeout_at};
 
 use super::{Answer, Desk};
-use crate::{clients::Word, pdu::Ask};
+use crate::{clients::Word, config::GatewayConfig, pdu::Ask};
 use drived_doors::{
     Caller,
     audit::{Kind, Record},
@@ -19,6 +19,7 @@ use drived_doors::{
 use drived_plant::plant::{
     commands::{Action, LONGEST_LIFETIME, OutcomeWord, Rejected, Request, Target},
     revisions::Subject,
+    watched::WatchedDoor,
 };
 
 /// Why a write is not carried out: the exception, and the reason in words.
@@ -117,12 +118,6 @@ impl Desk {
 
     fn caller(&self, peer: IpAddr) -> Caller {
         Caller::new(self.config.name.clone(), format!("modbus {peer}"), self.config.rights)
-    }
-
-    /// This program itself, upon the silence of a client.
-    fn policy(&self, peer: IpAddr) -> Caller {
-        let who = format!("this program, by on_client_silence of {}", self.config.name);
-        Caller::new(who, format!("modbus {peer}"), self.config.rights)
     }
 
     /// What each word of a write asks, as far as that needs no exchange.
@@ -327,7 +322,7 @@ impl Desk {
                 "nothing starts by a run command that only goes on: write one without run first",
             ));
         }
-        self.clients.start(peer, drive.name(), Instant::now());
+        self.plant.watched().start(watched(&self.config), peer, drive.name()).await;
         self.order(caller, drive, action, arrived, deadline).await
     }
 
@@ -466,39 +461,12 @@ impl Desk {
         });
         self.plant.revisions().push(Subject::Event, &event);
     }
+}
 
-    /// Looks after clients that have started a motor and are silent, for ever.
-    pub(crate) async fn watch_silence(&self) {
-        let Some(limit) = self.config.client_timeout else { return };
-        let mut looks = tokio::time::interval(Duration::from_millis(500).min(limit));
-        loop {
-            looks.tick().await;
-            for (peer, name) in self.clients.silent(Instant::now(), limit) {
-                let Some(drive) = self.drives().into_iter().find(|drive| **drive.name() == *name) else {
-                    continue;
-                };
-                if !drive.snapshot().started_here() {
-                    continue;
-                }
-                let text = format!("{peer} started it and has been silent for {limit:?}");
-                tracing::warn!("gateway {}: {name}: {text}", self.config.name);
-                let event = serde_json::json!({
-                    "time_unix_ms": drived_words::json::unix(Instant::now()),
-                    "drive": name,
-                    "event": "client_silent",
-                    "alarm": true,
-                    "text": text,
-                });
-                self.plant.revisions().push(Subject::Event, &event);
-                if self.config.stops_when_silent {
-                    // Nobody has asked for it: it is this program's policy.
-                    let caller = self.policy(peer);
-                    // Whoever waits for it, the fleet repeats it until it is confirmed.
-                    let _ = self.stop(&caller, &drive, StopMode::Ramp, Instant::now()).await;
-                }
-            }
-        }
-    }
+/// A gateway as the door of those who have to be heard.
+pub(crate) fn watched(config: &GatewayConfig) -> WatchedDoor<'_> {
+    let GatewayConfig { name, listen, client_timeout, stops_when_silent, .. } = config;
+    WatchedDoor { name, listen: *listen, limit: *client_timeout, stops: *stops_when_silent }
 }
 
 fn busy() -> Refusal {

@@ -282,8 +282,7 @@ async fn the_motor_of_a_client_that_went_silent_is_stopped_where_told_so() {
             config.stops_when_silent = stops;
         })
         .await;
-        let watched = Arc::clone(&desk);
-        tokio::spawn(async move { watched.watch_silence().await });
+        tokio::spawn(plant.plant.clone().follow_watched(|_, _| {}));
         let mut peer = Peer::of(&desk);
         climb(&mut peer, 1).await;
         assert_eq!(peer.ask(1, &write(LFR, 300)).await, write(LFR, 300));
@@ -312,6 +311,103 @@ async fn the_motor_of_a_client_that_went_silent_is_stopped_where_told_so() {
             assert!(cause.contains("this program, by on_client_silence"), "{cause}");
         }
     }
+}
+
+/// A motor that runs by a client that has to be heard every five seconds; it goes on asking.
+async fn started_by_one_who_is_watched() -> (TestPlant, Arc<Desk>, Peer) {
+    let (plant, desk) = operated(1, |config| {
+        config.client_timeout = Some(Duration::from_secs(5));
+        config.stops_when_silent = true;
+    })
+    .await;
+    tokio::spawn(plant.plant.clone().follow_watched(|_, _| {}));
+    let mut peer = Peer::of(&desk);
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &write(LFR, 300)).await, write(LFR, 300));
+    assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+    (plant, desk, peer)
+}
+
+/// It asks for half a minute and its motor runs; then it is silent, and the motor is stopped.
+async fn is_watched_on(plant: &TestPlant, mut peer: Peer) {
+    for _ in 0..8 {
+        sleep(Duration::from_secs(4)).await;
+        peer.ask(1, &read(ETA, 1)).await;
+    }
+    assert!(plant.machines[0].observe().running, "it is heard");
+    sleep(Duration::from_secs(20)).await;
+    assert!(!plant.machines[0].observe().running, "it is silent");
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_has_started_a_drive_is_watched_on_when_the_drive_is_called_otherwise() {
+    let (plant, _desk, peer) = started_by_one_who_is_watched().await;
+    let settings = drive_fleet::DriveSettings::controlled("mixer");
+    plant.plant.fleet().rename("pump 1", settings).unwrap();
+    // It is looked for between both.
+    sleep(Duration::from_millis(600)).await;
+    plant.plant.renamed("pump 1", "mixer");
+    is_watched_on(&plant, peer).await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_has_started_a_drive_is_watched_on_by_the_gateway_that_stands_where_his_stood_or_is_called_like_it()
+ {
+    for (name, listen) in [("renamed", "127.0.0.1:0"), ("scada", "127.0.0.1:7")] {
+        let (plant, desk, peer) = started_by_one_who_is_watched().await;
+        drop(peer);
+        let config =
+            GatewayConfig { name: name.to_owned(), listen: listen.parse().unwrap(), ..desk.config.clone() };
+        plant.plant.watched().set_doors(&[crate::desk::watched(&config)]);
+        let desk = Desk::new(config, plant.plant.clone(), Default::default(), super::names(&plant));
+        is_watched_on(&plant, Peer::of(&desk)).await;
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_has_started_a_drive_by_a_gateway_that_is_gone_is_silent_whatever_he_says_elsewhere() {
+    let (plant, desk, _peer) = started_by_one_who_is_watched().await;
+    let other = GatewayConfig {
+        name: "other".to_owned(),
+        listen: "127.0.0.1:7".parse().unwrap(),
+        client_timeout: None,
+        ..desk.config.clone()
+    };
+    plant.plant.watched().set_doors(&[crate::desk::watched(&other)]);
+    let desk = Desk::new(other, plant.plant.clone(), Default::default(), super::names(&plant));
+    let mut peer = Peer::of(&desk);
+    for _ in 0..5 {
+        sleep(Duration::from_secs(4)).await;
+        peer.ask(1, &read(ETA, 1)).await;
+    }
+    assert!(!plant.machines[0].observe().running);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_gateway_that_lets_its_clients_be_silent_from_now_on_stops_nothing() {
+    let (plant, desk, peer) = started_by_one_who_is_watched().await;
+    drop(peer);
+    let config = GatewayConfig { client_timeout: None, ..desk.config.clone() };
+    plant.plant.watched().set_doors(&[crate::desk::watched(&config)]);
+    sleep(Duration::from_secs(60)).await;
+    assert!(plant.machines[0].observe().running);
+}
+
+/// A page that starts the motor again is no client of a gateway, and that one's silence is nothing to it.
+#[tokio::test(start_paused = true)]
+async fn the_silence_of_who_started_a_motor_stops_no_run_that_somebody_began_long_after() {
+    let (plant, _desk, mut peer) = started_by_one_who_is_watched().await;
+    assert_eq!(peer.ask(1, &write(CMD, 0x0007)).await, write(CMD, 0x0007));
+    for _ in 0..20 {
+        sleep(Duration::from_secs(4)).await;
+        peer.ask(1, &read(ETA, 1)).await;
+    }
+    let drive = plant.plant.fleet().drive("pump 1").unwrap();
+    let begun = drive.run(drive_core::Direction::Forward, drive_core::Frequency::from_hertz(20)).await;
+    assert!(begun.is_confirmed(), "{begun}");
+    drop(peer);
+    sleep(Duration::from_secs(30)).await;
+    assert!(plant.machines[0].observe().running);
 }
 
 #[tokio::test(start_paused = true)]

@@ -15,6 +15,7 @@ pub mod testing;
 pub mod untold;
 mod usage;
 pub mod views;
+pub mod watched;
 mod watching;
 
 use std::{
@@ -47,6 +48,7 @@ use self::{
     revisions::Revisions,
     tally::Tally,
     usage::Usage,
+    watched::Watched,
 };
 use drived_config::{
     config::Group,
@@ -85,16 +87,23 @@ struct Inner {
     names: OnceLock<Names>,
     past: RwLock<Option<Arc<dyn past::Past>>>,
     untold: RwLock<Option<Arc<dyn untold::Untold>>>,
+    watched: Watched,
 }
 
 impl Plant {
     /// A plant whose alarms live as long as the program.
     pub fn start(fleet: Fleet, groups: Vec<Group>, demo: bool) -> Self {
-        Self::start_with(fleet, groups, demo, &KeptAlarms::default())
+        Self::start_with(fleet, groups, demo, &KeptAlarms::default(), Watched::default())
     }
 
-    /// A plant that goes on with the alarms that were kept.
-    pub fn start_with(fleet: Fleet, groups: Vec<Group>, demo: bool, kept: &KeptAlarms) -> Self {
+    /// A plant that goes on with the alarms that were kept, and with those who have to be heard.
+    pub fn start_with(
+        fleet: Fleet,
+        groups: Vec<Group>,
+        demo: bool,
+        kept: &KeptAlarms,
+        watched: Watched,
+    ) -> Self {
         let inner = Arc::new(Inner {
             fleet,
             groups: RwLock::new(groups),
@@ -116,6 +125,7 @@ impl Plant {
             names: OnceLock::new(),
             past: RwLock::default(),
             untold: RwLock::default(),
+            watched,
         });
         watching::start(&inner);
         history::start(&inner);
@@ -281,6 +291,7 @@ impl Plant {
     pub fn renamed(&self, old: &str, new: &str) {
         self.0.history.rename(old, new);
         self.rename_alarms(old, new);
+        self.0.watched.rename(old, new);
     }
 
     /// The last ten minutes of a drive.

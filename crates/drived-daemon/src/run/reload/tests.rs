@@ -3,7 +3,7 @@
 use std::{fs, time::Duration};
 
 use drive_families::{Family, simulated};
-use drive_fleet::DriveSettings;
+use drive_fleet::{DriveSettings, Fleet};
 use http_body_util::BodyExt as _;
 use tower::ServiceExt as _;
 

@@ -7,7 +7,7 @@ use drive_sim::SimSlave;
 use tokio::time::sleep;
 
 use super::*;
-use crate::plant::testing::TestPlant;
+use crate::plant::{testing::TestPlant, watched::Watched};
 use drived_config::{
     rights::{Rights, Role, Scope},
     testing::Folder,
@@ -98,7 +98,7 @@ async fn a_program_that_is_started_anew_has_the_alarms_with_their_notes_and_a_tr
     test.plant.act_on_alarm(&operator(), before.id, &acknowledge("mechanic comes")).unwrap();
     test.plant.close_alarms();
     keeping.await.unwrap();
-    let plant = Plant::start_with(test.plant.fleet(), Vec::new(), false, &kept());
+    let plant = Plant::start_with(test.plant.fleet(), Vec::new(), false, &kept(), Watched::default());
     sleep(Duration::from_secs(20)).await;
     let after = one(&plant).alarm;
     assert_eq!((after.id, after.count, after.first_unix_ms), (before.id, 1, before.first_unix_ms));

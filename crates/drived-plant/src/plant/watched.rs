@@ -1,0 +1,379 @@
+//! Whoever has started a motor and has to be heard as long as it runs: kept as long as the program, whatever becomes of the face by which
+//! he came and of the drive's name, and in the state folder beyond it.
+
+use std::{
+    collections::BTreeMap,
+    io,
+    net::{IpAddr, SocketAddr},
+    path::Path,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
+
+use drive_core::{Status, StopMode};
+use drive_fleet::DriveHandle;
+use serde::{Deserialize, Serialize};
+use tokio::{
+    sync::watch,
+    task::{JoinHandle, spawn_blocking},
+    time::{Instant, interval, timeout},
+};
+
+use super::{
+    Plant,
+    commands::{Action, LONGEST_LIFETIME, Request, Target},
+    revisions::Subject,
+};
+use drived_config::{
+    kept::{Kept, Readers},
+    rights::{Caller, Role},
+};
+use drived_words::json::unix;
+
+/// The file of the state folder.
+const FILE: &str = "watched.json";
+/// What is not so where they cannot be kept.
+const LOSS: &str = "after a kill no motor is stopped for the silence of who has started it";
+/// How long a start waits at the most until it is kept who has to be heard: a disk that hangs holds up no pump for ever.
+const KEPT_WITHIN: Duration = Duration::from_millis(400);
+/// A start waits no longer than a client has patience, a minute at the most: a motor that stands then was not started.
+const STARTED_WITHIN: Duration = Duration::from_secs(61);
+/// How often it is looked who is silent.
+const LOOKED: Duration = Duration::from_millis(500);
+
+/// A door by which clients come that have to be heard, as it is configured.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WatchedDoor<'a> {
+    pub name: &'a str,
+    pub listen: SocketAddr,
+    /// How long a client may be silent; `None`: for ever.
+    pub limit: Option<Duration>,
+    /// Whether the motor is stopped then.
+    pub stops: bool,
+}
+
+/// Who has started a motor, and what becomes of it when he is silent.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Starter {
+    door: String,
+    listen: SocketAddr,
+    client: IpAddr,
+    limit_ms: u64,
+    stops: bool,
+}
+
+impl Starter {
+    const fn limit(&self) -> Duration {
+        Duration::from_millis(self.limit_ms)
+    }
+}
+
+/// The watch over who has started a drive.
+#[derive(Debug, Clone)]
+pub struct Watch {
+    starter: Starter,
+    /// Since when he is watched by this program.
+    began: Instant,
+    heard: Instant,
+    /// His silence was told.
+    is_told: bool,
+}
+
+/// Somebody who has been silent for too long.
+struct Silent {
+    drive: DriveHandle,
+    starter: Starter,
+}
+
+/// Who has to be heard, by the name of the drive that he has started last.
+#[derive(Debug)]
+pub struct Watched {
+    file: Option<Kept>,
+    drives: Mutex<BTreeMap<String, Watch>>,
+    /// How often that has changed which is kept, and up to which change it is in the file.
+    changed: watch::Sender<u64>,
+    written: watch::Sender<u64>,
+}
+
+impl Default for Watched {
+    fn default() -> Self {
+        Self {
+            file: None,
+            drives: Mutex::default(),
+            changed: watch::Sender::new(0),
+            written: watch::Sender::new(0),
+        }
+    }
+}
+
+impl Watched {
+    /// Those of this state folder whose runs were not ended; without one they live as long as the program. They count as silent from
+    /// now on, until they are heard.
+    pub fn in_folder(folder: Option<&Path>, runs: impl Fn(&str) -> bool) -> Self {
+        let file = folder.map(|folder| Kept::at(&folder.join(FILE)));
+        let read = file.as_ref().map_or(Ok(BTreeMap::new()), read);
+        let kept = read.unwrap_or_else(|error| {
+            tracing::error!(
+                "watched.json: {error}: no motor is stopped for the silence of who has started it before now"
+            );
+            BTreeMap::new()
+        });
+        let now = Instant::now();
+        let watch = |starter| Watch { starter, began: now, heard: now, is_told: false };
+        let kept = kept.into_iter().filter(|(drive, _)| runs(drive));
+        let drives = kept.map(|(drive, starter)| (drive, watch(starter))).collect();
+        Self { file, drives: Mutex::new(drives), ..Self::default() }
+    }
+
+    /// These are the doors from now on. Who came by one of them, by its address or by its name, is watched as it says, and has its whole
+    /// time to come again: the door was closed. Who came by one that is gone can not be heard any more.
+    pub fn set_doors(&self, doors: &[WatchedDoor<'_>]) {
+        let now = Instant::now();
+        let mut drives = self.lock();
+        drives.retain(|_, watch| {
+            let Watch { starter, heard, .. } = watch;
+            let by_address = doors.iter().find(|door| door.listen == starter.listen);
+            let Some(door) = by_address.or_else(|| doors.iter().find(|door| door.name == starter.door))
+            else {
+                return true;
+            };
+            let Some(limit) = door.limit else { return false };
+            *heard = now;
+            (starter.door, starter.listen) = (door.name.to_owned(), door.listen);
+            (starter.limit_ms, starter.stops) = (milliseconds(limit), door.stops);
+            true
+        });
+        self.change();
+    }
+
+    /// A client has asked for something at a door.
+    pub fn hear(&self, door: &str, client: IpAddr, now: Instant) {
+        for watch in self.lock().values_mut() {
+            if watch.starter.client == client && watch.starter.door == door {
+                (watch.heard, watch.is_told) = (now, false);
+            }
+        }
+    }
+
+    /// A client is about to start a drive by a door. It is kept when this ends, or cannot be soon.
+    pub async fn start(&self, door: WatchedDoor<'_>, client: IpAddr, drive: &str) {
+        let now = Instant::now();
+        let starter = door.limit.map(|limit| Starter {
+            door: door.name.to_owned(),
+            listen: door.listen,
+            client,
+            limit_ms: milliseconds(limit),
+            stops: door.stops,
+        });
+        let (mut is_kept, change) = {
+            let mut drives = self.lock();
+            let before = match starter.clone() {
+                Some(starter) => {
+                    let watch = Watch { starter, began: now, heard: now, is_told: false };
+                    drives.insert(drive.to_owned(), watch)
+                }
+                // Whoever starts it now needs not be heard.
+                None => drives.remove(drive),
+            };
+            if before.map(|before| before.starter) == starter {
+                return;
+            }
+            (self.written.subscribe(), self.change())
+        };
+        if self.file.is_some() {
+            // A file that is not written holds up nothing.
+            let _ = timeout(KEPT_WITHIN, is_kept.wait_for(|written| *written >= change)).await;
+        }
+    }
+
+    /// A drive is called otherwise.
+    pub(super) fn rename(&self, old: &str, new: &str) {
+        let mut drives = self.lock();
+        if let Some(watch) = drives.remove(old) {
+            drives.insert(new.to_owned(), watch);
+            self.change();
+        }
+    }
+
+    /// A drive has left the fleet: the watch over who has started it, for when it comes again by whatever name.
+    pub fn take(&self, drive: &str) -> Option<Watch> {
+        let watch = self.lock().remove(drive);
+        if watch.is_some() {
+            self.change();
+        }
+        watch
+    }
+
+    /// A drive comes again whose motor was left turning.
+    pub fn put(&self, drive: &str, watch: Watch) {
+        self.lock().insert(drive.to_owned(), Watch { began: Instant::now(), ..watch });
+        self.change();
+    }
+
+    /// Who is silent and has not been told yet. Who has started nothing that still runs is forgotten.
+    fn look(&self, now: Instant, find: impl Fn(&str) -> Option<DriveHandle>) -> Vec<Silent> {
+        let (mut silent, mut is_less) = (Vec::new(), false);
+        self.lock().retain(|drive, watch| {
+            // It is about to be called otherwise, or to come again.
+            let Some(drive) = find(drive) else { return true };
+            let snapshot = drive.snapshot();
+            if !snapshot.started_here() {
+                // A run of before is ours only once the drive has said so.
+                let stands = snapshot.fresh_status(now).is_some_and(Status::is_undriven);
+                let began = now.saturating_duration_since(watch.began);
+                let is_over = stands && (watch.is_told || began >= STARTED_WITHIN);
+                is_less |= is_over;
+                return !is_over;
+            }
+            if !watch.is_told && now.saturating_duration_since(watch.heard) >= watch.starter.limit() {
+                silent.push(Silent { drive, starter: watch.starter.clone() });
+            }
+            true
+        });
+        if is_less {
+            self.change();
+        }
+        silent
+    }
+
+    /// What follows from a silence is done. Where the drive is called otherwise meanwhile it is done again.
+    fn tell(&self, drive: &str) {
+        if let Some(watch) = self.lock().get_mut(drive) {
+            watch.is_told = true;
+        }
+    }
+
+    fn change(&self) -> u64 {
+        self.changed.send_modify(|changes| *changes += 1);
+        *self.changed.borrow()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<String, Watch>> {
+        self.drives.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn milliseconds(limit: Duration) -> u64 {
+    u64::try_from(limit.as_millis()).unwrap_or(u64::MAX)
+}
+
+fn read(file: &Kept) -> io::Result<BTreeMap<String, Starter>> {
+    match file.read()? {
+        Some((text, _)) => Ok(serde_json::from_slice(&text)?),
+        None => Ok(BTreeMap::new()),
+    }
+}
+
+impl Plant {
+    /// Who has to be heard.
+    pub fn watched(&self) -> &Watched {
+        &self.0.watched
+    }
+
+    /// Keeps who has to be heard in the state folder, until the plant or the runtime is gone.
+    pub fn keep_watched(&self) -> JoinHandle<()> {
+        let plant = Arc::downgrade(&self.0);
+        let mut changed = self.0.watched.changed.subscribe();
+        // What was left out of the file's is left out there, too.
+        changed.mark_changed();
+        tokio::spawn(async move {
+            let mut is_failing = false;
+            while changed.changed().await.is_ok() {
+                let Some(inner) = plant.upgrade() else { return };
+                let Some(file) = inner.watched.file.clone() else { return };
+                let (change, all) = {
+                    let drives = inner.watched.lock();
+                    let starter = |(drive, watch): (&String, &Watch)| (drive.clone(), watch.starter.clone());
+                    (*changed.borrow_and_update(), drives.iter().map(starter).collect::<BTreeMap<_, _>>())
+                };
+                drop(inner);
+                let place = file.path().display().to_string();
+                let write = move || file.replace(&serde_json::to_vec_pretty(&all)?, Readers::Owner);
+                let Ok(written) = spawn_blocking(write).await else { return };
+                if let (Err(error), false) = (&written, is_failing) {
+                    tracing::warn!("{place}: {error}: {LOSS}");
+                }
+                is_failing = written.is_err();
+                let Some(inner) = plant.upgrade() else { return };
+                if !is_failing {
+                    inner.watched.written.send_replace(change);
+                }
+            }
+        })
+    }
+
+    /// Looks after those who have started a motor and are silent, for ever. A stop is recorded as it is given.
+    pub async fn follow_watched(self, record: impl Fn(&Caller, String) + Send) {
+        let mut looks = interval(LOOKED);
+        loop {
+            looks.tick().await;
+            let (now, fleet) = (Instant::now(), self.fleet());
+            for Silent { drive, starter } in self.0.watched.look(now, |name| fleet.drive(name)) {
+                let Starter { door, client, .. } = &starter;
+                let name = drive.name();
+                let text = format!("{client} started it and has been silent for {:?}", starter.limit());
+                tracing::warn!("gateway {door}: {name}: {text}");
+                let event = serde_json::json!({
+                    "time_unix_ms": unix(now),
+                    "drive": name,
+                    "event": "client_silent",
+                    "alarm": true,
+                    "text": text,
+                });
+                self.revisions().push(Subject::Event, &event);
+                if !starter.stops {
+                    self.0.watched.tell(name);
+                    continue;
+                }
+                // Nobody has asked for it: it is this program's policy.
+                let who = format!("this program, by on_client_silence of {door}");
+                let caller = Caller::new(who, format!("modbus {client}"), Role::Stop.rights());
+                let action = Action::Stop(StopMode::Ramp.into());
+                record(&caller, format!("{name}: {}", action.text()));
+                let target = Target::Drive(name.to_string());
+                let request = Request { id: None, target, action, lifetime: LONGEST_LIFETIME, arrived: now };
+                // Nobody waits for it: the fleet repeats it until it is confirmed.
+                match self.begin(&caller, request) {
+                    Ok(_) => self.0.watched.tell(name),
+                    Err(rejected) => tracing::warn!("{name}: the stop is given again: {rejected}"),
+                }
+            }
+        }
+    }
+}
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::plant::{alarms::KeptAlarms, testing::TestPlant};
+    use drived_config::testing::Folder;
+
+    #[tokio::test(start_paused = true)]
+    async fn who_is_watched_is_kept_before_a_start_and_known_after_a_kill_where_the_run_was_not_ended() {
+        let (folder, test) = (Folder::new("watched"), TestPlant::of(1).await);
+        let place = folder.file("");
+        let open = |runs: bool| Watched::in_folder(Some(&place), move |_| runs);
+        let known = |watched: &Watched| watched.lock().keys().cloned().collect::<Vec<_>>();
+        let kept = KeptAlarms::default();
+        let plant = Plant::start_with(test.plant.fleet(), Vec::new(), false, &kept, open(true));
+        let keeping = plant.keep_watched();
+        let door = |limit| WatchedDoor {
+            name: "scada",
+            listen: "127.0.0.1:1502".parse().unwrap(),
+            limit,
+            stops: true,
+        };
+        let client = "10.0.0.7".parse().unwrap();
+        plant.watched().start(door(Some(Duration::from_secs(4))), client, "pump 1").await;
+        assert_eq!(known(&open(true)), ["pump 1"]);
+        assert!(known(&open(false)).is_empty());
+        // Whoever starts it by a door where nobody has to be heard is not watched.
+        plant.watched().start(door(None), client, "pump 1").await;
+        assert!(known(&open(true)).is_empty());
+        keeping.abort();
+        fs::write(folder.file(FILE), "{\"pump 1\":{").unwrap();
+        assert!(known(&open(true)).is_empty());
+    }
+}
