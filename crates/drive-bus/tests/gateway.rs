@@ -251,7 +251,7 @@ async fn a_stop_of_all_is_repeated_to_who_comes_back_however_many_were_in_vain_b
         // One in vain takes the gateway's wait, and the next may wait for four times as long as that.
         let longest = habits.wait * habits.attempts * 5;
         assert!(
-            waited.len() == DRIVES.into() && waited.iter().all(|waited| *waited <= longest),
+            waited.len() == usize::from(DRIVES) && waited.iter().all(|waited| *waited <= longest),
             "{waited:?}"
         );
     }
