@@ -179,7 +179,7 @@ impl Task {
 async fn lost(losses: &mut watch::Receiver<u64>) {
     if losses.changed().await.is_err() {
         // Nobody will tell it any more.
-        std::future::pending().await
+        std::future::pending::<()>().await;
     }
 }
 
