@@ -437,7 +437,8 @@ async fn rule_9_a_watchdog_is_armed_verified_fed_and_trips_in_its_time_when_the_
 #[tokio::test(start_paused = true)]
 async fn rule_9_a_watchdogs_trip_is_reset_by_the_policy_that_says_so_and_the_motor_stays() {
     each(async |family| {
-        if contract(family).is_none() {
+        // Of an Altivar 58 nobody can say by what it tripped.
+        if contract(family).is_none() || family == Family::ATV58 {
             return;
         }
         let mut plant = Plant::single(family, |settings| settings.on_fault = OnFault::ResetWatchdogTrip);

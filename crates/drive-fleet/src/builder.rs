@@ -285,7 +285,8 @@ impl FleetBuilder {
     }
 
     /// Checks everything that can be checked beforehand and starts one task for each drive on the current tokio runtime.
-    /// Nothing is written to any drive until somebody commands it, except its watchdog at standstill.
+    /// Nothing is written to any drive until somebody commands it, except its watchdog at standstill, and the stop of a run of ours that
+    /// an earlier run of the program did not see confirmed.
     ///
     /// # Errors
     /// [`FleetError`] with what does not fit, and the arithmetic where it is arithmetic.

@@ -68,6 +68,8 @@ pub enum Policy {
     StartWithdrawn,
     /// A stop goes on, because the value that confirmed it was withdrawn.
     ValueWithdrawn,
+    /// A stop that an earlier run of the program was given, and was ended before it was confirmed, goes on.
+    StopOfBefore,
     /// [`OnExit`](crate::OnExit), because the fleet shuts down.
     Exit,
     /// [`OnExit`](crate::OnExit), because the drive leaves the fleet: it was removed, or became another.
@@ -88,6 +90,7 @@ drive_core::named! { Policy {
     StartNotConfirmed => "start not confirmed",
     StartWithdrawn => "start withdrawn",
     ValueWithdrawn => "value withdrawn",
+    StopOfBefore => "stop of before",
     Exit => "exit",
     Removal => "removal",
     Watchdog => "watchdog",

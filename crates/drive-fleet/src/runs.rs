@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use drive_core::Lease;
+use drive_core::{Lease, StopMode};
 use tokio::{
     sync::{mpsc, oneshot},
     time::timeout,
@@ -59,10 +59,27 @@ impl Keeper {
         keeper
     }
 
-    /// The run command of this side as it stands now. The identity counts that the drive had when it was given.
-    pub(crate) fn follow(&mut self, lease: Option<Lease>, identity: impl FnOnce() -> Option<String>) {
-        if self.told.as_ref().map(|told| told.lease) != lease {
-            self.tell(lease.map(|lease| RunRecord { identity: identity(), lease }), None);
+    /// The run command of this side as it stands now, and the stop that is to end it. The identity counts that the drive had when the
+    /// run command was given.
+    pub(crate) fn follow(
+        &mut self,
+        lease: Option<Lease>,
+        stop: Option<StopMode>,
+        identity: impl FnOnce() -> Option<String>,
+    ) {
+        let told = self.told.as_ref();
+        if told.map(|told| (told.lease, told.stop)) == lease.map(|lease| (lease, stop)) {
+            return;
+        }
+        let known = told.filter(|told| Some(told.lease) == lease).map(|told| told.identity.clone());
+        let run = lease.map(|lease| RunRecord { identity: known.unwrap_or_else(identity), lease, stop });
+        self.tell(run, None);
+    }
+
+    /// A run command of which it is not known yet whether it is ours is to be stopped.
+    pub(crate) fn note_stop(&mut self, stop: StopMode) {
+        if let Some(told) = self.told.clone().filter(|told| told.stop != Some(stop)) {
+            self.tell(Some(RunRecord { stop: Some(stop), ..told }), None);
         }
     }
 
@@ -99,5 +116,30 @@ impl Keeper {
         if let Some(keeps) = &self.keeps {
             let _ = keeps.send(RunKept { drive, run, kept });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_core::Direction;
+
+    use super::*;
+
+    #[test]
+    fn a_stop_is_kept_with_its_run_and_the_identity_of_the_start_until_it_is_over() {
+        let (keeps, mut kept) = mpsc::unbounded_channel();
+        let mut keeper = Keeper::new(Arc::from("pump"), Some(keeps), None);
+        let lease = Lease::new(Direction::Forward, 0x000F);
+        let identity = Some("one".to_owned());
+        keeper.follow(Some(lease), None, || identity.clone());
+        // Its line was lost: it has not said anew which it is.
+        keeper.follow(Some(lease), Some(StopMode::Ramp), || None);
+        keeper.follow(Some(lease), Some(StopMode::Ramp), || None);
+        keeper.note_stop(StopMode::Fast);
+        keeper.follow(None, None, || None);
+        drop(keeper);
+        let record = |stop| Some(RunRecord { identity: identity.clone(), lease, stop });
+        let told: Vec<_> = std::iter::from_fn(|| kept.try_recv().ok()).map(|kept| kept.run).collect();
+        assert_eq!(told, [record(None), record(Some(StopMode::Ramp)), record(Some(StopMode::Fast)), None]);
     }
 }

@@ -306,7 +306,8 @@ pub struct Alarms {
 /// the next as [`run_before`](DriveSettings::run_before): a program that was killed has stopped nothing.
 ///
 /// It is ours again only where the drive says that it is the same one and its own words show that this very run command stands.
-/// Else somebody else has started the motor.
+/// Else somebody else has started the motor. Where a [`stop`](Self::stop) of it was given and not confirmed, the same drive is stopped
+/// by it as soon as it has said that it is the same.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[non_exhaustive]
@@ -316,6 +317,9 @@ pub struct RunRecord {
     pub identity: Option<String>,
     /// The run command.
     pub lease: Lease,
+    /// How the stop that was given of it, and not confirmed, was to stop it; `None`: it may go on.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub stop: Option<StopMode>,
 }
 
 /// What happens to a drive when the fleet shuts down (rule 8).

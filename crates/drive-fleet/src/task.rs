@@ -63,8 +63,11 @@ impl Task {
             let lease = drive.lease();
             desk.supervisor.handle_lease(lease);
             // The record of an earlier run stays kept until the drive has said whether it is ours.
+            let stop = desk.supervisor.stop_under_way();
             if lease.is_some() || !desk.supervisor.is_adopting() {
-                keeper.follow(lease, || desk.supervisor.says_what_it_is());
+                keeper.follow(lease, stop, || desk.supervisor.says_what_it_is());
+            } else if let Some(stop) = stop {
+                keeper.note_stop(stop);
             }
             if losses.has_changed().unwrap_or(false) {
                 losses.mark_unchanged();
@@ -328,7 +331,7 @@ async fn carry_out(
         && let Some(word) = drive.run_word_for(direction)
     {
         let began = Instant::now();
-        keeper.before(RunRecord { identity, lease: Lease::new(direction, word) }).await;
+        keeper.before(RunRecord { identity, lease: Lease::new(direction, word), stop: None }).await;
         // The disk's time is the order's: a start is not sent late for it (rule 2).
         lifetime = lifetime.map(|lifetime| lifetime.saturating_sub(began.elapsed()));
     }

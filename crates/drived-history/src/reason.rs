@@ -49,8 +49,10 @@ impl Reasons {
         let act: Option<Act> = of_act.and_then(|body| serde_json::from_str(body).ok());
         let Some(Act { cause: By::Policy { policy } }) = act else { return };
         // What is done at the end, by other settings or at the watchdog was asked for, and no event began it.
-        let is_upon_event =
-            !matches!(&*policy, "exit" | "removal" | "settings" | "watchdog" | "start_withdrawn");
+        let is_upon_event = !matches!(
+            &*policy,
+            "exit" | "removal" | "settings" | "watchdog" | "start_withdrawn" | "stop_of_before"
+        );
         if let Some(reason) = self.0.get(&drive).filter(|_| is_upon_event) {
             record.text.push_str(&format!("; it was done by itself, upon this: {reason}"));
         }

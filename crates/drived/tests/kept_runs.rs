@@ -83,6 +83,30 @@ fn a_run_of_a_killed_daemon_is_ours_again_after_its_restart_and_the_exit_stops_i
 }
 
 #[test]
+fn a_stop_that_was_not_confirmed_when_the_daemon_was_killed_is_given_anew_by_the_next_one() {
+    let mut plant = Plant::new("kept-stop");
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"identified""#);
+    run(&["start", "pump", "--setpoint", "20Hz", "--socket", &plant.socket]).assert_done();
+    plant.sim.say("line cut", "done");
+    let stopped = run(&["stop", "pump", "--socket", &plant.socket]);
+    assert_ne!(stopped.code, Some(0), "{stopped:?}");
+    let record = fs::read_to_string(plant.record()).expect("it is kept");
+    assert!(record.contains(r#""stop": "ramp""#), "{record}");
+    daemon.signal("-KILL");
+    assert_eq!(daemon.end().0, None);
+    plant.sim.say("line join", "done");
+    let mut daemon = plant.daemon();
+    let confirmed = daemon.wait_for(r#""event":"stop_confirmed""#);
+    assert!(confirmed.contains("stop_of_before"), "{confirmed}");
+    let kept = || fs::read_to_string(plant.record()).expect("it is there");
+    let (code, last) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{last}");
+    assert!(!plant.shown().contains("running"), "{}", plant.shown());
+    assert_eq!(kept().trim(), "{}", "it was seen to stand no more");
+}
+
+#[test]
 fn a_run_that_somebody_else_has_given_since_is_not_ours_and_the_exit_leaves_it_and_says_so() {
     let plant = Plant::new("kept-other");
     plant.run_and_kill();

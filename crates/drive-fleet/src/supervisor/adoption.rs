@@ -4,9 +4,9 @@
 use drive_core::{Lease, Verdict};
 use tokio::time::Instant;
 
-use super::Supervisor;
+use super::{Asker, Supervisor};
 use crate::{
-    cause::Cause,
+    cause::{Cause, Policy},
     event::EventKind,
     settings::{DriveSettings, RunRecord},
     snapshot::IdentityCheck,
@@ -44,8 +44,14 @@ impl Supervisor {
                 true
             ) =>
             {
-                self.adoption = Adoption::Due(record.lease);
-                return self.pace.hurry(now);
+                let (lease, stop) = (record.lease, record.stop);
+                self.adoption = Adoption::Due(lease);
+                self.pace.hurry(now);
+                // It is ours, and not to go on: whoever has given its stop has not seen it confirmed.
+                if let Some(mode) = crate::mutant!("stop-of-before-forgotten", stop, None) {
+                    self.stop_by_policy(now, Asker::Policy(Policy::StopOfBefore), mode);
+                }
+                return;
             }
             _ => "it was given to another drive than answers here",
         };
@@ -60,8 +66,13 @@ impl Supervisor {
     /// The record of an earlier run of which it is not known yet whether it is ours.
     pub(super) fn unadopted(&self) -> Option<RunRecord> {
         match &self.adoption {
-            Adoption::Kept(record) => Some(record.clone()),
-            Adoption::Due(lease) => Some(RunRecord { identity: self.says_what_it_is(), lease: *lease }),
+            Adoption::Kept(record) => {
+                Some(RunRecord { stop: self.stop_under_way().or(record.stop), ..record.clone() })
+            }
+            Adoption::Due(lease) => {
+                let (identity, stop) = (self.says_what_it_is(), self.stop_under_way());
+                Some(RunRecord { identity, lease: *lease, stop })
+            }
             Adoption::Decided | Adoption::Asked => None,
         }
     }

@@ -108,7 +108,11 @@ impl Supervisor {
             identity: self.checks.remembered(),
             watchdog: self.checks.left(),
             run: lease
-                .map(|lease| RunRecord { identity: self.says_what_it_is(), lease })
+                .map(|lease| RunRecord {
+                    identity: self.says_what_it_is(),
+                    lease,
+                    stop: self.stop_under_way(),
+                })
                 .or_else(|| self.unadopted()),
             eeprom: (self.ledger.kept.writes > 0).then(|| self.ledger.kept.clone()),
         }

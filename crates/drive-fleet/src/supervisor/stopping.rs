@@ -165,6 +165,11 @@ impl Supervisor {
         self.begin_stop(now, asker, mode.into(), self.settings.times.stop_alarm);
     }
 
+    /// How the stop that is given and not confirmed yet is to stop it.
+    pub(crate) fn stop_under_way(&self) -> Option<StopMode> {
+        self.stopping.as_ref().map(|stopping| stopping.asked)
+    }
+
     /// For how long direct current is to be held now.
     pub(crate) fn injection(&self) -> Option<Duration> {
         self.stopping.as_ref().and_then(|stopping| stopping.injection).or(self.settings.injection)

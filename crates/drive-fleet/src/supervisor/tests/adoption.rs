@@ -16,7 +16,7 @@ fn restarted(record: Option<RunRecord>, stands: Option<Lease>) -> Rig {
 
 /// As the program of before has kept it.
 fn record(rig: &Rig) -> Option<RunRecord> {
-    Some(RunRecord { identity: Some(rig.drive.identity.to_string()), lease: RUN })
+    Some(RunRecord { identity: Some(rig.drive.identity.to_string()), lease: RUN, stop: None })
 }
 
 fn exits(rig: &mut Rig) -> Option<ExitAction> {
@@ -68,7 +68,7 @@ fn a_run_without_a_record_is_somebody_elses_whatever_word_stands() {
 
 #[test]
 fn a_record_of_another_drive_makes_no_run_ours() {
-    let other = RunRecord { identity: Some("two".to_owned()), lease: RUN };
+    let other = RunRecord { identity: Some("two".to_owned()), lease: RUN, stop: None };
     let mut rig = restarted(Some(other), Some(RUN));
     assert!(rig.events().contains(&"run not adopted"), "{:?}", rig.events());
     assert!(!rig.snapshot().started_here());
@@ -98,6 +98,65 @@ fn a_record_waits_for_a_drive_that_is_away_when_the_program_starts() {
     rig.drive.failing = None;
     rig.pass(2_000 * MS);
     assert!(rig.snapshot().started_here(), "{:?}", rig.events());
+}
+
+/// As a program that was killed with a stop under way has kept it.
+fn to_be_stopped(mode: StopMode) -> DriveSettings {
+    let run_before = record(&Rig::controlled()).map(|record| RunRecord { stop: Some(mode), ..record });
+    DriveSettings { run_before, ..settings() }
+}
+
+#[test]
+fn a_stop_of_before_that_was_not_confirmed_is_given_anew_and_the_run_does_not_go_on() {
+    for (mode, stands) in [(StopMode::Ramp, Some(RUN)), (StopMode::Fast, Some(RUN)), (StopMode::Ramp, None)] {
+        let mut rig = Rig::new(to_be_stopped(mode));
+        rig.drive.run();
+        rig.stands = stands;
+        rig.pass(3_000 * MS);
+        assert!(rig.drive.writes().starts_with(&[Job::Stop(mode)]), "{:?}", rig.drive.writes());
+        let cause = Cause::Policy { policy: Policy::StopOfBefore };
+        assert_eq!(rig.cause_of("stop confirmed"), Some(cause), "{:?}", rig.events());
+        assert!(!rig.snapshot().started_here());
+        assert_eq!(rig.machine.left().run, None);
+    }
+}
+
+#[test]
+fn a_stop_of_before_is_repeated_until_it_is_confirmed_and_kept_until_then() {
+    let mut rig = Rig::new(to_be_stopped(StopMode::Ramp));
+    rig.drive.run();
+    rig.stands = Some(RUN);
+    rig.drive.refuses_stops = true;
+    rig.pass(60_000 * MS);
+    assert!(rig.drive.writes().len() > 10, "{:?}", rig.drive.writes());
+    assert!(rig.events().contains(&"stop unconfirmed"), "{:?}", rig.events());
+    let kept = rig.machine.left().run.expect("it stands");
+    assert_eq!((kept.lease, kept.stop), (RUN, Some(StopMode::Ramp)));
+    rig.drive.refuses_stops = false;
+    rig.pass(3_000 * MS);
+    assert!(rig.events().contains(&"stop confirmed"), "{:?}", rig.events());
+    assert_eq!(rig.machine.left().run, None);
+}
+
+#[test]
+fn a_stop_of_before_waits_for_a_drive_that_is_away_and_stops_no_other_drive() {
+    let mut rig = Rig::new(to_be_stopped(StopMode::Ramp));
+    rig.stands = Some(RUN);
+    rig.drive.run();
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    rig.pass(20_000 * MS);
+    let kept = rig.machine.left().run.expect("nobody has stopped it");
+    assert_eq!(kept.stop, Some(StopMode::Ramp));
+    rig.drive.failing = None;
+    rig.pass(2_000 * MS);
+    assert!(rig.events().contains(&"stop confirmed"), "{:?}", rig.events());
+
+    let other = Identity { model: Some("two".to_owned()), ..Identity::default() };
+    let mut rig = Rig::new(to_be_stopped(StopMode::Ramp));
+    rig.drive.identity = other;
+    rig.drive.run();
+    rig.pass(3_000 * MS);
+    assert_eq!(rig.drive.writes(), [], "whoever has started it goes on");
 }
 
 const AN_ATV71: Recognised = Recognised::NotMine { it_is: "an Altivar 71, which no family here fits" };
