@@ -2,7 +2,7 @@
 
 use std::{iter, time::Duration};
 
-use drive_core::{Class, Direction, StopMode, Withdrawn};
+use drive_core::{Class, Direction, Error, StopMode, Withdrawn};
 
 use super::{Complaint, OTHER, SETPOINT, SETTLED, Stage};
 use crate::{
@@ -132,7 +132,11 @@ impl Contract {
             if stage.witness.heard().iter().any(Heard::writes) {
                 stage.blame(format!("asked whether it may start, it {}", told(&stage.witness.heard())));
             }
-            let started = stage.rig.drive.start(Direction::Forward).await.map(drop);
+            let started = match stage.rig.drive.start(Direction::Forward).await.map(drop) {
+                // It was sent: what its drive does not tell is no refusal.
+                Err(Error::NotConfirmed { .. }) => Ok(()),
+                started => started,
+            };
             if asked != started {
                 stage.blame(format!("tripped: {}; it may: {asked:?}, it does: {started:?}", trip.is_some()));
             }
