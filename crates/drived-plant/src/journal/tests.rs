@@ -201,7 +201,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
             ],
         ),
         (Level::INFO, &["line north back after "]),
-        (Level::ERROR, &["north: back after up to ", "pump 1 running at 30 Hz", "tripped: SLF"]),
+        (Level::ERROR, &["north: back after up to ", "pump 1", " running at 30 Hz", " tripped: SLF"]),
         // A noisy minute.
         (
             Level::WARN,
