@@ -131,6 +131,9 @@ async fn exceptions_damage_and_silence_are_met_again_and_what_was_not_asked_is_t
         // Repeated, and answered then; the last request has had no time for its answer.
         (sent, 1_000, read(5)),
         (received, 1_040, answer(9)),
+        // It may be that to a question before, which is owed: it is thrown away once, and asked for again.
+        (sent, 1_060, read(5)),
+        (received, 1_090, answer(9)),
         (sent, 1_100, read(6)),
     ]);
     let (simulated, mut asked) = played_back(&recording, RTU);
