@@ -133,7 +133,7 @@ impl Plant {
         if self.disk == Disk::Small {
             // Its state lies on a disk of its own, which nobody else sees.
             let script = "mount -t tmpfs -o size=12m none \"$XDG_STATE_HOME\" && exec \"$0\" \"$@\"";
-            command = self.with_state(Command::new("unshare"));
+            command = process::at_home("unshare", &self.folder, &self.state());
             command.args(["--map-root-user", "--mount", "sh", "-c", script]).arg(&self.program);
         }
         command.envs(self.mutant.map(|mutant| ("DRIVED_MUTANT", mutant)));
@@ -212,19 +212,7 @@ impl Plant {
 
     /// The program, with a state folder of this plant.
     pub(super) fn tool(&self) -> Command {
-        self.with_state(Command::new(&self.program))
-    }
-
-    fn with_state(&self, mut command: Command) -> Command {
-        command
-            .env_remove("DRIVED_LOG")
-            .env_remove("DRIVED_MUTANT")
-            .env("RUST_BACKTRACE", "0")
-            .env_remove("RUNTIME_DIRECTORY")
-            .env("XDG_RUNTIME_DIR", &self.folder)
-            .env_remove("STATE_DIRECTORY")
-            .env("XDG_STATE_HOME", self.state());
-        command
+        process::at_home(&self.program, &self.folder, &self.state())
     }
 
     #[allow(clippy::disallowed_methods, reason = "nothing asynchronous stands here")]

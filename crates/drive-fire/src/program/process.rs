@@ -2,13 +2,28 @@
 
 use std::{
     collections::BTreeSet,
+    ffi::OsStr,
     fs,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::{Command, Stdio},
 };
 
 /// The supply of descriptors that a process is given again.
 pub(super) const DESCRIPTORS: u64 = 1_024;
+
+/// A program that has its sockets in this folder and its state in that one, and nothing of whoever attacks it.
+pub(super) fn at_home(program: impl AsRef<OsStr>, folder: &Path, state: &Path) -> Command {
+    let mut command = Command::new(program);
+    command
+        .env_remove("DRIVED_LOG")
+        .env_remove("DRIVED_MUTANT")
+        .env("RUST_BACKTRACE", "0")
+        .env_remove("RUNTIME_DIRECTORY")
+        .env("XDG_RUNTIME_DIR", folder)
+        .env_remove("STATE_DIRECTORY")
+        .env("XDG_STATE_HOME", state);
+    command
+}
 
 /// Where the system tells of it.
 pub(super) fn folder(pid: u32) -> PathBuf {

@@ -277,16 +277,7 @@ async fn unit_0_stops_all_where_allowed_and_nothing_else() {
 #[tokio::test(start_paused = true)]
 async fn the_motor_of_a_client_that_went_silent_is_stopped_where_told_so() {
     for stops in [false, true] {
-        let (plant, desk) = operated(1, |config| {
-            config.client_timeout = Some(Duration::from_secs(5));
-            config.stops_when_silent = stops;
-        })
-        .await;
-        tokio::spawn(plant.plant.clone().follow_watched(|_, _| {}));
-        let mut peer = Peer::of(&desk);
-        climb(&mut peer, 1).await;
-        assert_eq!(peer.ask(1, &write(LFR, 300)).await, write(LFR, 300));
-        assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+        let (plant, _desk, mut peer) = started_by_one_who_is_watched(stops).await;
         for _ in 0..10 {
             sleep(Duration::from_secs(4)).await;
             peer.ask(1, &read(ETA, 1)).await;
@@ -313,11 +304,11 @@ async fn the_motor_of_a_client_that_went_silent_is_stopped_where_told_so() {
     }
 }
 
-/// A motor that runs by a client that has to be heard every five seconds; it goes on asking.
-async fn started_by_one_who_is_watched() -> (TestPlant, Arc<Desk>, Peer) {
+/// A motor that runs by a client that has to be heard every five seconds, or is stopped where told so; it goes on asking.
+async fn started_by_one_who_is_watched(stops: bool) -> (TestPlant, Arc<Desk>, Peer) {
     let (plant, desk) = operated(1, |config| {
         config.client_timeout = Some(Duration::from_secs(5));
-        config.stops_when_silent = true;
+        config.stops_when_silent = stops;
     })
     .await;
     tokio::spawn(plant.plant.clone().follow_watched(|_, _| {}));
@@ -341,7 +332,7 @@ async fn is_watched_on(plant: &TestPlant, mut peer: Peer) {
 
 #[tokio::test(start_paused = true)]
 async fn who_has_started_a_drive_is_watched_on_when_the_drive_is_called_otherwise() {
-    let (plant, _desk, peer) = started_by_one_who_is_watched().await;
+    let (plant, _desk, peer) = started_by_one_who_is_watched(true).await;
     let settings = drive_fleet::DriveSettings::controlled("mixer");
     plant.plant.fleet().rename("pump 1", settings).unwrap();
     // It is looked for between both.
@@ -354,7 +345,7 @@ async fn who_has_started_a_drive_is_watched_on_when_the_drive_is_called_otherwis
 async fn who_has_started_a_drive_is_watched_on_by_the_gateway_that_stands_where_his_stood_or_is_called_like_it()
  {
     for (name, listen) in [("renamed", "127.0.0.1:0"), ("scada", "127.0.0.1:7")] {
-        let (plant, desk, peer) = started_by_one_who_is_watched().await;
+        let (plant, desk, peer) = started_by_one_who_is_watched(true).await;
         drop(peer);
         let config =
             GatewayConfig { name: name.to_owned(), listen: listen.parse().unwrap(), ..desk.config.clone() };
@@ -366,7 +357,7 @@ async fn who_has_started_a_drive_is_watched_on_by_the_gateway_that_stands_where_
 
 #[tokio::test(start_paused = true)]
 async fn who_has_started_a_drive_by_a_gateway_that_is_gone_is_silent_whatever_he_says_elsewhere() {
-    let (plant, desk, _peer) = started_by_one_who_is_watched().await;
+    let (plant, desk, _peer) = started_by_one_who_is_watched(true).await;
     let other = GatewayConfig {
         name: "other".to_owned(),
         listen: "127.0.0.1:7".parse().unwrap(),
@@ -385,7 +376,7 @@ async fn who_has_started_a_drive_by_a_gateway_that_is_gone_is_silent_whatever_he
 
 #[tokio::test(start_paused = true)]
 async fn a_gateway_that_lets_its_clients_be_silent_from_now_on_stops_nothing() {
-    let (plant, desk, peer) = started_by_one_who_is_watched().await;
+    let (plant, desk, peer) = started_by_one_who_is_watched(true).await;
     drop(peer);
     let config = GatewayConfig { client_timeout: None, ..desk.config.clone() };
     plant.plant.watched().set_doors(&[crate::desk::watched(&config)]);
@@ -396,7 +387,7 @@ async fn a_gateway_that_lets_its_clients_be_silent_from_now_on_stops_nothing() {
 /// A page that starts the motor again is no client of a gateway, and that one's silence is nothing to it.
 #[tokio::test(start_paused = true)]
 async fn the_silence_of_who_started_a_motor_stops_no_run_that_somebody_began_long_after() {
-    let (plant, _desk, mut peer) = started_by_one_who_is_watched().await;
+    let (plant, _desk, mut peer) = started_by_one_who_is_watched(true).await;
     assert_eq!(peer.ask(1, &write(CMD, 0x0007)).await, write(CMD, 0x0007));
     for _ in 0..20 {
         sleep(Duration::from_secs(4)).await;

@@ -132,16 +132,7 @@ impl Site {
     }
 
     fn command(&self, program: impl AsRef<std::ffi::OsStr>) -> Command {
-        let mut command = Command::new(program);
-        command
-            .env_remove("DRIVED_LOG")
-            .env_remove("DRIVED_MUTANT")
-            .env("RUST_BACKTRACE", "0")
-            .env_remove("RUNTIME_DIRECTORY")
-            .env("XDG_RUNTIME_DIR", &self.folder)
-            .env_remove("STATE_DIRECTORY")
-            .env("XDG_STATE_HOME", self.state());
-        command
+        process::at_home(program, &self.folder, &self.state())
     }
 
     fn new_token(&self) -> io::Result<String> {
