@@ -39,7 +39,7 @@ struct Arguments {
 enum Part {
     /// The fault matrix.
     Matrix {
-        /// So many cells of each of its four planes.
+        /// So many cells of each of its planes.
         #[arg(long, default_value_t = 500)]
         of_each: u64,
         /// One cell alone, as a find names it.
@@ -238,7 +238,7 @@ fn main() -> ExitCode {
     let told: Vec<Told> = match part {
         Part::Matrix { cell: Some(name), .. } => {
             let Some(cell) = matrix::Cell::named(&name) else {
-                eprintln!("{name} is no cell: a letter of W, F, E, A, a colon and a number");
+                eprintln!("{name} is no cell: a letter of W, F, E, A, P, a colon and a number");
                 return ExitCode::FAILURE;
             };
             println!("{cell}");

@@ -74,6 +74,17 @@ pub struct SecondMaster {
     pub requests: Vec<(u8, Vec<u8>)>,
     /// From the beginning of one request to that of the next.
     pub every: Duration,
+    /// What the first does not hear of it.
+    pub unheard: Option<Unheard>,
+}
+
+/// What one master does not hear of the other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Unheard {
+    /// What it asks: the bus has four wires, and masters hear slaves alone.
+    Requests,
+    /// What it is answered: the cable is too bad for what a slave says to somebody else.
+    Answers,
 }
 
 /// The defects of a line, and where they are in time.
@@ -94,6 +105,11 @@ impl Defective {
         let seed = defects.noise.map_or(0, |noise| noise.seed);
         let (since, drawn) = (Some(now), Some(now));
         Self { defects, since, random: Rng::with_seed(seed), bursts: VecDeque::new(), drawn, made: 0 }
+    }
+
+    /// What the master does not hear of a second one.
+    pub(crate) fn unheard(&self) -> Option<Unheard> {
+        self.defects.second_master.as_ref()?.unheard
     }
 
     /// When what has come by `arrived` is handed over, where the adapter waits.

@@ -25,7 +25,7 @@ mod world;
 
 pub use bank::{Bank, Refusal};
 pub use control::ControlError;
-pub use defects::{Defects, Interference, Noise, Rest, SecondMaster};
+pub use defects::{Defects, Interference, Noise, Rest, SecondMaster, Unheard};
 pub use fault::{ALWAYS, Fault, Faults, PerMillion};
 pub use habits::{HeaderForm, LinkHabits, Unacknowledged};
 pub use line::{AddressError, SimLine, SimSlave, Wiring};

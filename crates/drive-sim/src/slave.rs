@@ -153,7 +153,7 @@ impl Slave {
             }
         };
         // Nobody answers a request to all.
-        let speech = Speech { slave: address, content, heard: now, turnaround };
+        let speech = Speech { slave: address, content, heard: now, turnaround, is_to_another: false };
         (cast == Cast::Unicast).then_some(speech)
     }
 

@@ -12,6 +12,8 @@ pub(crate) struct Speech {
     /// When the last bit of what it answers was on the wire, and how long the slave waits after it.
     pub(crate) heard: Instant,
     pub(crate) turnaround: Duration,
+    /// Whether a second master has asked.
+    pub(crate) is_to_another: bool,
 }
 
 /// What is said.

@@ -142,11 +142,19 @@ pub enum FarEnd {
     Doubling,
     /// One whose connections go mute after a while.
     GoesMute,
+    /// A second master that asks the same drive for the same, of which the drive's answers alone are heard: a bus of four wires.
+    MasterHeardInAnswers,
+    /// The same, of which its questions alone are heard: the cable is too bad for what it is answered.
+    MasterHeardInQuestions,
 }
 
 impl FarEnd {
+    /// So many of [`ALL`](Self::ALL) stand on each plane but the last; the others, which came later, on that alone: a number stays
+    /// the cell that it was.
+    pub const FIRST: usize = 10;
+
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Plain,
         Self::Fast,
         Self::Twins,
@@ -157,7 +165,15 @@ impl FarEnd {
         Self::Replaying,
         Self::Doubling,
         Self::GoesMute,
+        Self::MasterHeardInAnswers,
+        Self::MasterHeardInQuestions,
     ];
+
+    /// Whether a second master sits on the line.
+    #[must_use]
+    pub const fn has_second_master(self) -> bool {
+        matches!(self, Self::SecondMaster | Self::MasterHeardInAnswers | Self::MasterHeardInQuestions)
+    }
 
     /// What comes of it, where a fault has `struck` besides, and cannot be told from what is right.
     #[must_use]
@@ -173,6 +189,9 @@ impl FarEnd {
             Self::SecondMaster if struck => Some(Untold::value(
                 "the answer to a second master is struck, of which nobody knows any more whose it is",
             )),
+            Self::MasterHeardInAnswers => Some(Untold::value(
+                "an answer to a second master that is not heard itself comes while one of this length is waited for",
+            )),
             _ => None,
         }
     }
@@ -180,15 +199,16 @@ impl FarEnd {
     /// Why it is not on this way.
     #[must_use]
     pub fn impossible_on(self, way: Way) -> Option<&'static str> {
+        let is_on_the_wire = matches!(self, Self::Fast | Self::Twins) || self.has_second_master();
         match (self, way.is_network()) {
             (Self::Plain, _) => None,
-            (Self::Fast | Self::Twins | Self::SecondMaster, true) => {
+            (_, true) if is_on_the_wire => {
                 Some("what sits beside a wire is behind the gateway, which answers for it")
             }
-            (Self::SecondMaster, false) if way == Way::UniTelway => {
+            (_, false) if self.has_second_master() && way == Way::UniTelway => {
                 Some("UNI-TELWAY has one master by its rules")
             }
-            (Self::Fast | Self::Twins | Self::SecondMaster, false) => None,
+            (_, false) if is_on_the_wire => None,
             (_, false) => Some("a wire has no gateway"),
             (_, true) => None,
         }
@@ -208,6 +228,8 @@ impl fmt::Display for FarEnd {
             Self::Replaying => "replaying gateway",
             Self::Doubling => "doubling gateway",
             Self::GoesMute => "connections go mute",
+            Self::MasterHeardInAnswers => "a second master heard in its answers alone",
+            Self::MasterHeardInQuestions => "a second master heard in its questions alone",
         })
     }
 }

@@ -19,11 +19,13 @@ pub enum Plane {
     Events,
     /// Everything with everything.
     All,
+    /// A second master that is heard in part, with a fault of the wire.
+    HeardInPart,
 }
 
 impl Plane {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Wire, Self::FarEnds, Self::Events, Self::All];
+    pub const ALL: [Self; 5] = [Self::Wire, Self::FarEnds, Self::Events, Self::All, Self::HeardInPart];
 
     const fn letter(self) -> char {
         match self {
@@ -31,6 +33,7 @@ impl Plane {
             Self::FarEnds => 'F',
             Self::Events => 'E',
             Self::All => 'A',
+            Self::HeardInPart => 'P',
         }
     }
 
@@ -39,7 +42,7 @@ impl Plane {
         let all = [
             Subject::COUNT as u64,
             Way::ALL.len() as u64,
-            FarEnd::ALL.len() as u64,
+            FarEnd::FIRST as u64,
             Fault::ALL.len() as u64,
             PLACES.len() as u64,
             Event::ALL.len() as u64,
@@ -53,6 +56,10 @@ impl Plane {
             Self::FarEnds => [subjects, ways, far_ends, faults, places, 1, 1, states, operations],
             Self::Events => [subjects, ways, 1, 1, 1, events, moments, states, operations],
             Self::All => all,
+            Self::HeardInPart => {
+                let parts = (FarEnd::ALL.len() - FarEnd::FIRST) as u64;
+                [subjects, ways, parts, faults, places, 1, 1, states, operations]
+            }
         }
     }
 
@@ -104,6 +111,7 @@ impl Cell {
             digit as usize
         });
         let [subject, way, far_end, fault, place, event, moment, state, operation] = digits;
+        let far_end = if plane == Plane::HeardInPart { FarEnd::FIRST + far_end } else { far_end };
         Some(Self {
             plane,
             number,

@@ -8,7 +8,7 @@ use drive_bus::{
 };
 use drive_core::{Drive, Port, SlaveAddress, Terms};
 use drive_families::SetUp;
-use drive_sim::{Defects, Gateway, Model, SecondMaster, SimLine, SimSlave, Wiring};
+use drive_sim::{Defects, Gateway, Model, SecondMaster, SimLine, SimSlave, Unheard, Wiring};
 use drive_testing::contract::Open;
 
 use super::{
@@ -95,12 +95,17 @@ impl Stage {
         if site.far_end == FarEnd::Twins {
             simulated.add_beside(ADDRESS, machine(site)).expect("it is an address");
         }
-        if site.far_end == FarEnd::SecondMaster {
+        if site.far_end.has_second_master() {
             let row = site.subject.family().capabilities().rows.iter().find(|row| row.access.is_readable());
             let [high, low] = row.map_or(0, |row| row.address).to_be_bytes();
             let second = SecondMaster {
                 requests: vec![(ADDRESS, vec![3, high, low, 0, 1])],
                 every: Duration::from_millis(330),
+                unheard: match site.far_end {
+                    FarEnd::MasterHeardInAnswers => Some(Unheard::Requests),
+                    FarEnd::MasterHeardInQuestions => Some(Unheard::Answers),
+                    _ => None,
+                },
             };
             simulated.set_defects(Defects { second_master: Some(second), ..Defects::default() });
         }

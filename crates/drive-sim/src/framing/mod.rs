@@ -51,7 +51,8 @@ pub(crate) trait Framing: Send {
 
     /// An answer that was held back is released: said at once, or kept until its slave may speak.
     fn release(&mut self, slave: u8, message: Vec<u8>, now: Instant) -> Option<Speech> {
-        Some(Speech { slave, content: Content::Message(message), heard: now, turnaround: Duration::ZERO })
+        let content = Content::Message(message);
+        Some(Speech { slave, content, heard: now, turnaround: Duration::ZERO, is_to_another: false })
     }
 
     /// The frame of a message.

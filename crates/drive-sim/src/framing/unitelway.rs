@@ -199,7 +199,7 @@ impl UniTelway {
             _ if habits.silent => return None,
             _ => Content::Signal(vec![EOT]),
         };
-        Some(Speech { slave: address, content, heard: at, turnaround })
+        Some(Speech { slave: address, content, heard: at, turnaround, is_to_another: false })
     }
 
     /// Something else came than a word to what this slave has sent.
@@ -263,7 +263,8 @@ impl UniTelway {
                 NAK
             }
         };
-        Some(Speech { slave: address, content: Content::Signal(vec![signal]), heard: at, turnaround })
+        let content = Content::Signal(vec![signal]);
+        Some(Speech { slave: address, content, heard: at, turnaround, is_to_another: false })
     }
 }
 

@@ -10,6 +10,7 @@ use super::{
     transmission::{Kind, Overlap, Transmission},
 };
 use crate::{
+    defects::Unheard,
     fault::{Fault, flip},
     model::Dialect,
     pdu::is_confirmation,
@@ -27,7 +28,7 @@ impl Wire {
 
     /// One answer, with what the faults make of it.
     fn say(&mut self, ear: usize, speech: Speech, line: &mut State) {
-        let Speech { slave, content, heard, turnaround } = speech;
+        let Speech { slave, content, heard, turnaround, is_to_another } = speech;
         let Some(dialect) = self.ears.get(ear).map(|ear| ear.dialect) else { return };
         let start = heard + turnaround;
         let (bytes, start) = match content {
@@ -43,10 +44,10 @@ impl Wire {
         }
         if line.faults.strikes(Fault::Duplicated).is_some() {
             let again = start + self.time(bytes.len(), dialect.settings) + self.t3_5(dialect.settings);
-            self.transmit((slave, dialect), start, &bytes, late, line);
-            self.transmit((slave, dialect), again, &bytes, late, line);
+            self.transmit((slave, dialect), start, &bytes, (late, is_to_another), line);
+            self.transmit((slave, dialect), again, &bytes, (late, is_to_another), line);
         } else {
-            self.transmit((slave, dialect), start, &bytes, late, line);
+            self.transmit((slave, dialect), start, &bytes, (late, is_to_another), line);
         }
     }
 
@@ -72,7 +73,7 @@ impl Wire {
         let (stranger, dialect) = (line.stranger(slave, &mut random), heard.dialect);
         let foreign = heard.framing.encode(stranger, &message, line);
         let after = start + self.time(foreign.len(), dialect.settings) + self.t3_5(dialect.settings);
-        self.transmit((stranger, dialect), start, &foreign, false, line);
+        self.transmit((stranger, dialect), start, &foreign, (false, false), line);
         (frame, after)
     }
 
@@ -81,14 +82,14 @@ impl Wire {
         (slave, dialect): (u8, Dialect),
         start: Instant,
         bytes: &[u8],
-        late: bool,
+        (late, is_to_another): (bool, bool),
         line: &mut State,
     ) {
         line.stats.answers += 1;
         let takes = self.time(bytes.len(), dialect.settings);
         let polarity = line.defective.polarity();
         let characters = misheard::heard_as(polarity, bytes, dialect.settings, self.master.settings);
-        let kind = Kind::Answer;
+        let kind = if is_to_another { Kind::AnswerToAnother } else { Kind::Answer };
         let mut transmission =
             Transmission { slave, dialect, start, characters, takes, delivered: 0, late, kind };
         self.disturb_answer(&mut transmission, line);
@@ -165,7 +166,12 @@ impl Wire {
         let on_the_wire = self.transmissions.get(index).map(|transmission| self.ends(transmission, upto));
         let Some(transmission) = self.transmissions.get_mut(index) else { return Vec::new() };
         let heard = transmission.characters.get(transmission.delivered..upto).unwrap_or_default();
-        let piece = self.master.errors.read(heard);
+        let is_unheard = match (&transmission.kind, line.defective.unheard()) {
+            (Kind::Request { .. }, Some(Unheard::Requests)) => true,
+            (Kind::AnswerToAnother, Some(Unheard::Answers)) => true,
+            _ => false,
+        };
+        let piece = if is_unheard { Vec::new() } else { self.master.errors.read(heard) };
         transmission.delivered = upto;
         let is_over = upto == transmission.characters.len();
         // Nobody can hear a character before it is handed over, so a late hand-over is a later end.
@@ -178,12 +184,13 @@ impl Wire {
         }
         if is_over && let Some(transmission) = self.transmissions.remove(index) {
             match transmission.kind {
-                Kind::Answer => line.answered(transmission.slave, ends),
+                Kind::Answer | Kind::AnswerToAnother => line.answered(transmission.slave, ends),
                 Kind::Request { sent, pdu } if sent == transmission.characters => {
                     (line.reached, line.frame_began) = (Some(transmission.dialect), Some(transmission.start));
                     let at = on_the_wire.unwrap_or(now);
                     let said = line.request(at, transmission.slave, &pdu);
-                    self.speech.extend(said.into_iter().map(|speech| (0, speech)));
+                    let said = said.into_iter().map(|speech| Speech { is_to_another: true, ..speech });
+                    self.speech.extend(said.map(|speech| (0, speech)));
                 }
                 Kind::Request { .. } | Kind::Echo | Kind::Noise => {}
             }

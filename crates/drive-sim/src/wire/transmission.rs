@@ -27,6 +27,8 @@ pub(super) struct Transmission {
 pub(super) enum Kind {
     /// A slave's.
     Answer,
+    /// A slave's to a second master.
+    AnswerToAnother,
     /// The adapter's echo of the master's own: it is no use of the line.
     Echo,
     /// Nobody's.
@@ -42,7 +44,7 @@ impl Transmission {
 
     /// Whether it is another answer in the name of the same slave, to the same request.
     pub(super) fn is_of_the_same_address(&self, other: &Self) -> bool {
-        let answers = |one: &Self| one.kind == Kind::Answer && !one.late;
+        let answers = |one: &Self| matches!(one.kind, Kind::Answer | Kind::AnswerToAnother) && !one.late;
         answers(self) && answers(other) && (self.slave, self.dialect) == (other.slave, other.dialect)
     }
 

@@ -6,7 +6,9 @@ use crate::support::{
     CMD, KEEP, LINK_LOST, OUT, RAMP, REF, Small, TIMEOUT, TURNAROUND, ask, frame, hear, read, write,
 };
 use drive_core::{SerialSettings, serial::CharacterFormat};
-use drive_sim::{AddressError, Breach, Delivery, Exception, Panel, SimLine, Wiring};
+use drive_sim::{
+    AddressError, Breach, Defects, Delivery, Exception, Panel, SecondMaster, SimLine, Unheard, Wiring,
+};
 use tokio::{io::AsyncWriteExt, time::Instant};
 
 const PATIENCE: Duration = Duration::from_millis(500);
@@ -398,4 +400,31 @@ async fn a_request_that_cuts_a_slaves_pause_short_is_a_breach() {
         }
     }
     assert_eq!(broken, [1, 0, 1, 0, 1, 0]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_second_master_is_heard_whole_or_in_its_answers_or_in_its_questions() {
+    let question = read(1, KEEP.address(), 1);
+    // The parameter as it is delivered.
+    let answer = frame(&[1, 3, 2, 0, 7]);
+    let whole = [question.clone(), answer.clone()].concat();
+    for (unheard, expected) in
+        [(None, whole), (Some(Unheard::Requests), answer), (Some(Unheard::Answers), question)]
+    {
+        let line = line_of([1]);
+        let requests = vec![(1, vec![3, 0, 4, 0, 1])];
+        let second_master = Some(SecondMaster { requests, every: PATIENCE, unheard });
+        line.set_defects(Defects { second_master, ..Defects::default() });
+        let mut port = line.in_memory();
+        let mut heard = Vec::new();
+        // His first question comes after half a second, and is answered within thirty milliseconds.
+        let until = Instant::now() + PATIENCE + Duration::from_millis(200);
+        while Instant::now() < until {
+            heard.extend(hear(&mut port, Duration::from_millis(50)).await.unwrap_or_default());
+        }
+        assert_eq!(heard, expected, "{unheard:?}");
+        // Ours are heard as ever.
+        let ours = ask(&mut port, &read(1, CMD.address(), 1), Duration::from_millis(100)).await;
+        assert_eq!(ours, Some(frame(&[1, 3, 2, 0, 0])), "{unheard:?}");
+    }
 }

@@ -40,7 +40,7 @@ const FAMILIES: [Family; 3] = [Family::ATV21, Family::OMRON_3G3EV, Family::ATV31
 /// A panel that reads one word of two drives.
 fn somebody() -> SecondMaster {
     let requests = vec![(3, vec![3, 0x0C, 0x81, 0, 1]), (2, vec![3, 0, 0x20, 0, 1])];
-    SecondMaster { requests, every: Duration::from_millis(250) }
+    SecondMaster { requests, every: Duration::from_millis(250), unheard: None }
 }
 
 /// The line with its defect; one that follows time goes on beside the doctor.

@@ -85,7 +85,7 @@ async fn a_second_master_is_no_second_drive() {
             let (simulated, _) = one();
             // He reads of the same drive what we read of it, and of one that is not there.
             let requests = vec![(5, vec![3, 0x0C, 0x81, 0, words]), (9, vec![3, 0, 0, 0, 1])];
-            let second_master = Some(SecondMaster { requests, every: every * MS });
+            let second_master = Some(SecondMaster { requests, every: every * MS, unheard: None });
             simulated.set_defects(Defects { second_master, ..Defects::default() });
             let finds = scanned(&simulated, &at_one("19200 8N1", 3..=10)).await;
             assert_nobody_twice(&finds, &format!("{words} words every {every} ms"));
@@ -105,7 +105,7 @@ async fn each_family_is_named_beside_a_master_that_was_heard_before() {
             simulated.add_boxed(5, simulated::model(family, SetUp::ForTheBus).unwrap()).unwrap();
             // He reads of the same drive, and of one that is not there.
             let requests = vec![(5, vec![3, 0x0C, 0x81, 0, 1]), (9, vec![3, 0, 0, 0, 1])];
-            let second_master = Some(SecondMaster { requests, every: every * MS });
+            let second_master = Some(SecondMaster { requests, every: every * MS, unheard: None });
             simulated.set_defects(Defects { second_master, ..Defects::default() });
             let plan = at_one("19200 8N1", 1..=9);
             let open =
@@ -123,7 +123,7 @@ async fn each_family_is_named_beside_a_master_that_was_heard_before() {
 async fn a_master_that_begins_to_ask_behind_the_beginning_ends_a_scan_that_nobody_stands_beside() {
     let (simulated, _) = one();
     let requests = vec![(5, vec![3, 0x0C, 0x81, 0, 1])];
-    let second_master = Some(SecondMaster { requests, every: 250 * MS });
+    let second_master = Some(SecondMaster { requests, every: 250 * MS, unheard: None });
     simulated.set_defects(Defects { second_master, ..Defects::default() });
     let plan = at_one("19200 8N1", 1..=247);
     let open = async |config: LineConfig| Ok(Line::over(simulated.in_memory_at(config.serial), config));
