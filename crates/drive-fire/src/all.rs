@@ -65,7 +65,7 @@ type Part = (&'static str, u64, fn(&Turn<'_>) -> Came);
 /// All of them.
 const PARTS: [Part; 9] = [
     ("matrix", 40, |turn| {
-        Ok((vec![matrix::run(turn.seed, u64::MAX, turn.go_on())], turn.hunt(|| [matrix::find_again()])))
+        Ok((vec![matrix::run(turn.seed, u64::MAX, None, turn.go_on())], turn.hunt(|| [matrix::find_again()])))
     }),
     ("worlds", 30, |turn| {
         let tried = vec![story::run(turn.seed, u64::MAX, turn.go_on())];

@@ -42,6 +42,9 @@ enum Part {
         /// So many cells of each of its planes.
         #[arg(long, default_value_t = 500)]
         of_each: u64,
+        /// One plane alone, by the letter of its cells: W, F, E, A, P.
+        #[arg(long)]
+        plane: Option<char>,
         /// One cell alone, as a find names it.
         #[arg(long)]
         cell: Option<String>,
@@ -256,7 +259,7 @@ fn main() -> ExitCode {
             let only = Some(&*only).filter(|only| !only.is_empty());
             vec![matrix::find_plants(seed, of_each as usize, only)]
         }
-        Part::Matrix { of_each, .. } => vec![matrix::run(seed, of_each, go_on)],
+        Part::Matrix { of_each, plane, .. } => vec![matrix::run(seed, of_each, plane, go_on)],
         Part::Fuzz { target, execution, bytes, corpus, seconds, plants, orders } => {
             let only = target.as_deref().and_then(fuzz::Target::named);
             if target.is_some() && only.is_none() {

@@ -27,7 +27,7 @@ impl Plane {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Wire, Self::FarEnds, Self::Events, Self::All, Self::HeardInPart];
 
-    const fn letter(self) -> char {
+    pub(super) const fn letter(self) -> char {
         match self {
             Self::Wire => 'W',
             Self::FarEnds => 'F',

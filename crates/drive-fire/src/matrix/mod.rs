@@ -66,13 +66,14 @@ pub fn shuffled(plane: Plane, seed: u64) -> impl Iterator<Item = Cell> {
     })
 }
 
-/// So many cells of each plane that can exist and came to what is asked of them, in turn, or as many as time allows; `go_on` is asked
-/// before each.
-pub fn run(seed: u64, of_each: u64, mut go_on: impl FnMut() -> bool) -> Told {
+/// So many cells of each plane, or of the `only` one of this letter, that can exist and came to what is asked of them, in turn, or as many
+/// as time allows; `go_on` is asked before each.
+pub fn run(seed: u64, of_each: u64, only: Option<char>, mut go_on: impl FnMut() -> bool) -> Told {
     let begun = Instant::now();
     let mut told = Told::new("fault matrix", "cells");
     let can_exist = |plane| shuffled(plane, seed).filter(|cell: &Cell| cell.cannot_exist().is_none());
-    let mut planes: Vec<_> = Plane::ALL.map(|plane| (plane, can_exist(plane), 0)).into();
+    let asked = Plane::ALL.into_iter().filter(|plane| only.is_none_or(|only| only == plane.letter()));
+    let mut planes: Vec<_> = asked.map(|plane| (plane, can_exist(plane), 0)).collect();
     while !planes.is_empty() {
         planes.retain_mut(|(plane, cells, lived)| {
             let Some(cell) = cells.next().filter(|_| *lived < of_each && go_on()) else { return false };
