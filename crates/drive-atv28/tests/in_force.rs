@@ -130,6 +130,9 @@ async fn each_status_names_what_keeps_our_run_command_from_acting() {
         // LFt 5 is OCF (p. 57, W457).
         (&[(458, 0x0608), (457, 5), (459, 0x4002), (451, 0)][..], Lack::Output, "5"),
         (&[(450, 500)], Lack::Reference, "FrH is not the reference of the bus"),
+        // A reference of zero from elsewhere: the fast stop of an input, by bit 12 of ETI and without it, or an analog input.
+        (&[(450, 0), (451, 0), (459, 0x4002)], Lack::Reference, "FrH is not the reference of the bus"),
+        (&[(450, 0), (451, 0), (459, 0x5002)], Lack::Reference, "FrH is not the reference of the bus"),
         // Another master has taken the run command back; its word is read at once.
         (&[(CMD, 0x0007), (459, 0x4002), (451, 0)], Lack::Command, ""),
     ] {

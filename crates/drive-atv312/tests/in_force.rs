@@ -408,6 +408,8 @@ async fn each_status_names_what_keeps_our_run_command_from_acting() {
     let elsewhere = (3203, 500);
     for (more, lack, by) in [
         (&[elsewhere][..], Lack::Reference, "FrH"),
+        // A reference of zero from elsewhere, at which the motor does not turn.
+        (&[(3203, 0), (3202, 0), (3206, 0x4002)], Lack::Reference, "FrH"),
         // p. 21: bit 11 of ETA, "reference exceeded (< LSP or > HSP)": no other reference decides.
         (&[(3203, 200), (3201, 0x0A27)], Lack::Reference, "below LSP or above HSP"),
         // p. 42: AI2 at 4 V is summed to Fr1. p. 35: LI5 switches to Fr2 = AI1, LRS3 bit 0. p. 43: PS2 on LI3.

@@ -102,6 +102,10 @@ impl<P: Port> Drivecom for Atv58<P> {
 
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
         self.stops_by_ramp = Some(word) == self.map.ramp_stop;
+        if word & drivecom::ENABLE_OPERATION == drivecom::ENABLE_OPERATION && self.proof.held() != Some(word)
+        {
+            self.turned = self.turning;
+        }
         self.proof.is_writing(word);
         let mut calls = self.registers.at(class);
         match (class, effect) {
@@ -146,6 +150,7 @@ impl<P: Port> Drivecom for Atv58<P> {
         let shown = match status.direction {
             _ if stands && self.asks_for_nothing(status) => RunShown::InForce,
             _ if stands => RunShown::NotYet,
+            Some(direction) if direction != asked && self.turned != Some(direction) => RunShown::NotYet,
             Some(direction) if direction != asked => RunShown::TurningRound,
             _ => RunShown::InForce,
         };

@@ -14,9 +14,11 @@ pub mod words;
 
 use std::time::Duration;
 
+use tokio::time::Instant;
+
 use drive_core::{
-    Absent, Capabilities, Class, ExceptionMeaning, Port, Quantity, Registers, Result, Row, SerialSettings,
-    SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
+    Absent, Capabilities, Class, Direction, ExceptionMeaning, Frequency, Port, Quantity, Registers, Result,
+    Row, SerialSettings, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 use drive_drivecom::Proof;
 
@@ -91,6 +93,11 @@ pub struct Atv58<P> {
     proof: Proof<Look>,
     /// How many statuses behind each other show no output although operation is enabled.
     idle: u8,
+    /// Which way the motor turned at the last status, and when the run command that was given last was written.
+    turning: Option<Direction>,
+    turned: Option<Direction>,
+    /// The lowest output at which it was seen to turn against the run command, and when.
+    against: Option<(Frequency, Instant)>,
     /// The registers that this drive lacks.
     absent: Absent,
     map: Atv58Map,
@@ -117,6 +124,9 @@ impl<P: Port> Atv58<P> {
             registers: Registers::new(port, slave, &CAPABILITIES, meaning),
             proof: Proof::default(),
             idle: 0,
+            turning: None,
+            turned: None,
+            against: None,
             absent: Absent::default(),
             map,
             stops_by_ramp: false,

@@ -1,13 +1,15 @@
 //! What counts as done, on words where the default map has them: in force, and never only written.
 
-use std::time::Duration;
+use std::{io, time::Duration};
 
+use async_trait::async_trait;
 use drive_atv58::{ASCII_MESSAGE_WATCH, Atv58, Atv58Map, CAPABILITIES};
 use drive_core::{
-    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Lack, Lease, Motion, Refusal, Setpoint,
-    StopMode, Verdict,
+    Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Lack, Lease, Motion, Port, Refusal,
+    Setpoint, StopMode, Terms, Verdict,
 };
 use drive_testing::words::{Asked, Words, lacks_within};
+use tokio_modbus::{Request, Response, Slave, client::Client, slave::SlaveContext};
 
 const CMD: u16 = 400;
 const THIRTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(30));
@@ -149,4 +151,80 @@ async fn a_stop_that_nobody_saw_brake_the_motor_is_not_told_as_rest() {
     assert_eq!(drive.status().await.unwrap().motion, Motion::Driven);
     let _ = drive.stop(StopMode::Ramp).await;
     assert_eq!(drive.status().await.unwrap().motion, Motion::Coasting);
+}
+
+/// Words that change by what the drive is asked.
+#[derive(Debug)]
+struct Changing(Words, fn(&mut Words, &Request<'_>));
+
+impl Port for Changing {
+    fn set_terms(&mut self, terms: Terms) {
+        self.0.set_terms(terms);
+    }
+}
+
+impl SlaveContext for Changing {
+    fn set_slave(&mut self, _: Slave) {}
+}
+
+#[async_trait]
+impl Client for Changing {
+    async fn call(&mut self, request: Request<'_>) -> tokio_modbus::Result<Response> {
+        (self.1)(&mut self.0, &request);
+        self.0.call(request).await
+    }
+
+    async fn disconnect(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Bit 15 of ETA, and the sign of rFr: the motor turns in reverse.
+const REVERSE: [(u16, u16); 2] = [(458, 0x8627), (451, 0xFED4)];
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_stood_and_is_turned_the_other_way_is_not_called_started() {
+    fn turns(words: &mut Words, request: &Request<'_>) {
+        if matches!(request, Request::WriteSingleRegister(CMD, 0x000F)) {
+            words.words.extend(REVERSE);
+        }
+    }
+    let words = Words::new(&CAPABILITIES, &[&RUNS[..], &[(CMD, 7), (458, 0x0623), (451, 0)]].concat());
+    let mut drive = Atv58::new(Changing(words, turns), 1.try_into().unwrap());
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::NotConfirmed, "{error}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_turns_the_other_way_at_a_speed_that_does_not_fall_is_not_told_in_force() {
+    let mut drive = leased(&REVERSE, Atv58Map::default());
+    let mut told = Vec::new();
+    for _ in 0..10 {
+        told.push(drive.status().await.unwrap().verdict.unwrap());
+        tokio::time::advance(Duration::from_millis(500)).await;
+    }
+    assert!(!told.contains(&Verdict::InForce), "{told:?}");
+    let Some(Verdict::NotInForce { lacks: Lack::Reference, because }) = told.last() else {
+        panic!("{told:?}")
+    };
+    assert!(because.to_string().contains("turns the motor the other way"), "{because}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_turns_round_is_not_told_to_be_turned_by_somebody_else() {
+    fn comes_down(words: &mut Words, request: &Request<'_>) {
+        if matches!(request, Request::ReadHoldingRegisters(first, _) if *first > 401) {
+            let output = words.words.get(&451).copied().unwrap_or(0).cast_signed();
+            words.words.insert(451, (output + 1).min(0).cast_unsigned());
+        }
+    }
+    let words = Words::new(&CAPABILITIES, &[&RUNS[..], &REVERSE].concat());
+    let mut drive = Atv58::new(Changing(words, comes_down), 1.try_into().unwrap());
+    drive.adopt(Lease::new(Direction::Forward, 0x000F));
+    // A tenth of a hertz in two seconds: the slowest ramp, 999.9 s from 50 Hz.
+    for _ in 0..295 {
+        tokio::time::advance(Duration::from_secs(2)).await;
+        let verdict = drive.status().await.unwrap().verdict;
+        assert!(!matches!(verdict, Some(Verdict::NotInForce { .. })), "{verdict:?}");
+    }
 }

@@ -214,7 +214,8 @@ impl<L: Copy + PartialEq> Proof<L> {
 
     /// The one further exchange behind a status: the one that it cannot be told without, `needed`, the first of `wanted` that was
     /// not looked for yet behind these words, or what has its turn of so many `things`; 0: nothing has. What is needed behind each
-    /// status leaves the others their turn all the same, once the drive is known to hold a word.
+    /// status leaves the others their turn all the same, once the drive is known to hold a word, and each that is wanted every other
+    /// time: a motor that stands by a reference of zero from elsewhere would never be asked whose it is.
     pub fn choose(
         &mut self,
         needed: Option<L>,
@@ -226,6 +227,11 @@ impl<L: Copy + PartialEq> Proof<L> {
         let open = |(look, is_wanted): (L, bool)| (is_wanted && !self.looked.contains(&look)).then_some(look);
         let look = match needed {
             Some(_) if turn.is_some() && self.held.is_some() => None,
+            Some(needed) if self.held.is_some() && self.looked.contains(&needed) => {
+                let instead = wanted.into_iter().find_map(open);
+                self.looked.retain(|look| instead.is_none() || *look != needed);
+                instead.or(Some(needed))
+            }
             Some(_) => needed,
             None => wanted.into_iter().find_map(open),
         };
@@ -295,6 +301,21 @@ mod tests {
         proof.was_read(0x000F, 0);
         let looks: Vec<_> = (0..40).map(|_| proof.choose(Some(9), [], 2, |turn| turn as u8)).collect();
         assert_eq!(looks.iter().filter(|look| **look != Some(9)).count(), 2, "{looks:?}");
+        // What is wanted beside it has every other status, once each.
+        let mut proof = Proof::<u8>::default();
+        proof.was_read(0x000F, 0);
+        let looks: Vec<_> = (0..6)
+            .filter_map(|_| proof.choose(Some(9), [(7, true), (8, true)], 0, |turn| turn as u8))
+            .collect();
+        assert_eq!(looks, [9; 6], "what was not answered is asked again");
+        let mut looks = Vec::new();
+        while looks.len() < 7 {
+            let look =
+                proof.choose(Some(9), [(7, true), (8, true)], 0, |turn| turn as u8).expect("one is needed");
+            proof.looked(look);
+            looks.push(look);
+        }
+        assert_eq!(looks, [9, 7, 9, 8, 9, 9, 9]);
         // What is wanted at the same moment goes first, and the turn comes with the next status.
         let mut proof = Proof::<u8>::default();
         for _ in 0..19 {
