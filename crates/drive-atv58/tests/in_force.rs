@@ -228,3 +228,20 @@ async fn a_motor_that_turns_round_is_not_told_to_be_turned_by_somebody_else() {
         assert!(!matches!(verdict, Some(Verdict::NotInForce { .. })), "{verdict:?}");
     }
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_of_this_side_is_told_as_nobody_elses_while_the_motor_comes_down() {
+    // Behind 0007h operation is disabled, "switched on", and the motor is coming down (the chart's transition 5).
+    fn stops(words: &mut Words, request: &Request<'_>) {
+        if matches!(request, Request::WriteSingleRegister(CMD, 0x0007)) {
+            words.words.insert(458, 0x0223);
+        }
+    }
+    let mut drive = Atv58::new(Changing(Words::new(&CAPABILITIES, &RUNS), stops), 1.try_into().unwrap());
+    drive.start(Direction::Forward).await.unwrap();
+    drive.stop(StopMode::Ramp).await.unwrap();
+    for _ in 0..5 {
+        let verdict = drive.status().await.unwrap().verdict;
+        assert!(!matches!(verdict, Some(Verdict::NotInForce { .. })), "{verdict:?}");
+    }
+}

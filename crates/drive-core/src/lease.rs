@@ -183,11 +183,14 @@ impl Recognised {
     /// let told = Recognised::by_reference("ATV312HU15N4", "ATV21");
     /// assert!(matches!(told, Some(Recognised::NotMine { it_is }) if it_is.contains("the family atv312 fits")));
     /// assert_eq!(Recognised::by_reference("3G3EV", "ATV21"), None);
+    /// // As the manual of the Altivar 58's card prints it (VVDED397054, Identification).
+    /// assert_eq!(Recognised::by_reference("ATV-58U18N4", "ATV58"), Some(Recognised::Mine));
     /// ```
     #[must_use]
     pub fn by_reference(reference: &str, own: &str) -> Option<Self> {
         let begins = |prefix: &str| {
-            reference.trim().get(..prefix.len()).is_some_and(|begin| begin.eq_ignore_ascii_case(prefix))
+            let mut told = reference.chars().filter(char::is_ascii_alphanumeric);
+            prefix.chars().all(|wanted| told.next().is_some_and(|told| told.eq_ignore_ascii_case(&wanted)))
         };
         let &(prefix, it_is) = REFERENCES.iter().find(|(prefix, _)| begins(prefix))?;
         Some(if prefix == own { Self::Mine } else { Self::NotMine { it_is } })

@@ -218,6 +218,12 @@ impl OwnRun {
             }
             return Some(Verdict::lacks(Lack::Command, because));
         }
+        // Another word of this side is on its way, or arrived: what cuts the output may be that.
+        if self.held.is_none()
+            && self.lease.is_some_and(|lease| self.sent.is_some_and(|sent| sent != lease.word))
+        {
+            return Some(Verdict::NotKnown);
+        }
         let parts = [
             (Lack::Command, evidence.command),
             (Lack::Output, evidence.output),
@@ -310,6 +316,9 @@ mod tests {
         let mut own = given();
         own.sends(0x0007);
         assert_eq!(own.verdict(&gone), Some(Verdict::NotKnown), "it is on its way");
+        let output = Told::No(Refusal::NotInControl(Control::Local));
+        let cut = Evidence { word: RunWord::NotTold, output, ..IN_FORCE };
+        assert_eq!(own.judge(&cut), Some(Verdict::NotKnown), "what cuts the output may be this stop");
         own.reads(0x0007);
         assert_eq!((own.judge(&gone), own.lease()), (None, None));
         let mut own = given();

@@ -147,14 +147,16 @@ impl Supervisor {
             }
             Order::Start { direction, setpoint, .. } => {
                 self.allow_motion(now, status, active)?;
+                // What the drive holds may be another master's by now, and the limits others than when it was given: it is given anew.
+                let given = || self.given.map(|given| given.setpoint).ok_or(LimitProblem::UnknownSetpoint);
+                let setpoint = match setpoint {
+                    None if !self.settings.limits.is_empty() => Some(given().map_err(Refused::Limit)?),
+                    asked => asked,
+                };
                 match setpoint {
                     Some(setpoint) if active.is_none_or(|active| !active.setpoint_given) => {
                         self.allow_setpoint(now, setpoint)?;
                         Some(Job::SetSetpoint(setpoint, (!self.was_just_at_rest(now)).then_some(direction)))
-                    }
-                    // What the drive holds was given by nobody here, and may lie outside of the limits.
-                    None if !self.settings.limits.is_empty() && self.given.is_none() => {
-                        return Err(Refused::Limit(LimitProblem::UnknownSetpoint).into());
                     }
                     _ => Some(Job::Start(direction)),
                 }

@@ -41,7 +41,7 @@ pub(super) struct Named {
 
 /// What waits for its record in the audit log.
 pub(super) enum Order<A> {
-    Command { caller: Caller, request: Request, record: Record, answers: A },
+    Command { caller: Caller, request: Request, asked_after: Instant, record: Record, answers: A },
     Alarms { caller: Caller, order: AlarmsOrder, record: Record, answers: A },
 }
 
@@ -61,7 +61,8 @@ impl Counter {
     /// Stops at once: no disk and no other command holds it up.
     pub(super) fn stop(&self, caller: &Caller, request: Request, record: Record, answers: &impl Answers) {
         self.audit.record(record.clone()).whenever();
-        self.begin(caller, request, record, answers);
+        let asked_after = request.arrived;
+        self.begin(caller, request, asked_after, record, answers);
     }
 
     /// Carries out what waits, one after the other, when it stands in the audit log.
@@ -74,8 +75,8 @@ impl Counter {
                 continue;
             }
             match order {
-                Order::Command { caller, request, record, answers } => {
-                    self.begin(&caller, request, record, &answers);
+                Order::Command { caller, request, asked_after, record, answers } => {
+                    self.begin(&caller, request, asked_after, record, &answers);
                 }
                 Order::Alarms { caller, order, record, answers } => {
                     self.act_on_alarms(&caller, order, record, &answers);
@@ -106,9 +107,16 @@ impl Counter {
         }));
     }
 
-    fn begin(&self, caller: &Caller, request: Request, record: Record, answers: &impl Answers) {
+    fn begin(
+        &self,
+        caller: &Caller,
+        request: Request,
+        asked_after: Instant,
+        record: Record,
+        answers: &impl Answers,
+    ) {
         let named = named(&request);
-        match self.plant.begin(caller, request) {
+        match self.plant.begin_asked_after(caller, request, asked_after) {
             Ok(told) => self.follow(caller, told, record, answers),
             Err(rejected) => self.tell_refusal(caller, record, answers, named, rejected.into()),
         }
@@ -192,7 +200,9 @@ impl Counter {
 impl<A> Order<A> {
     fn head(&self) -> (&Caller, &Record, &A, Named) {
         match self {
-            Self::Command { caller, request, record, answers } => (caller, record, answers, named(request)),
+            Self::Command { caller, request, record, answers, .. } => {
+                (caller, record, answers, named(request))
+            }
             Self::Alarms { caller, order, record, answers } => {
                 let named = Named { id: order.id.clone(), ..Named::default() };
                 (caller, record, answers, named)

@@ -74,6 +74,8 @@ pub struct Message<A> {
     /// What the face itself has against it, unless it is a stop.
     pub doubt: Option<Refusal>,
     pub arrived: Instant,
+    /// Since when it may have been on its way, where its broker may keep it: a stop by another door since then goes before it.
+    pub asked_after: Option<Instant>,
     /// When it was sent, by the clock of its sender.
     pub sent_unix_ms: Option<u64>,
     /// How long it may wait unless it says so itself, and at the longest in any case.
@@ -138,12 +140,15 @@ impl<A: Answers + Sync> Desk<A> {
             return self.counter.stop(&caller, request, record, &answers);
         }
         self.stopped.clear();
+        let asked_after = message.asked_after;
         let request = match self.judged(message, target, id) {
             Ok(request) => request,
             Err(refusal) => return self.counter.refuse(&caller, record, &answers, named, refusal),
         };
         let (audited, to) = (record.clone(), answers.clone());
-        let order = Order::Command { caller: caller.clone(), request, record: audited, answers: to };
+        let asked_after = asked_after.map_or(request.arrived, |after| after.min(request.arrived));
+        let order =
+            Order::Command { caller: caller.clone(), request, asked_after, record: audited, answers: to };
         if self.orders.try_send(order).is_err() {
             self.counter.refuse(&caller, record, &answers, named, Refusal::Busy);
         }

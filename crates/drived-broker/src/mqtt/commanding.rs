@@ -141,6 +141,7 @@ impl Commanding {
             target,
             doubt,
             arrived: arrived.at,
+            asked_after: self.sent_after,
             sent_unix_ms: None,
             lifetime: LIFETIME,
             longest: expires.map(|seconds| Duration::from_secs(seconds.into())),

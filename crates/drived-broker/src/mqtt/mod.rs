@@ -16,7 +16,7 @@ mod topics;
 
 use std::{collections::HashMap, sync::Arc, time::Duration};
 
-use drive_fleet::{DriveHandle, Received};
+use drive_fleet::{DriveHandle, EventKind, Received};
 use tokio::{
     sync::{Notify, mpsc, watch},
     task::JoinHandle,
@@ -263,7 +263,13 @@ async fn keep(
                 None => return events,
             },
             received = next => match received {
-                Received::Event(event) => telling::tell_event(&face, &event),
+                Received::Event(event) => {
+                    telling::tell_event(&face, &event);
+                    // What was asked before it may be on its way still: from the next call on nothing is.
+                    if matches!(event.kind, EventKind::StateChanged { .. }) {
+                        commanding.call();
+                    }
+                }
                 Received::Missed(_) => {}
                 Received::End => happened = None,
             },

@@ -2,7 +2,7 @@ mod alarms;
 
 use std::collections::BTreeMap;
 
-use drive_core::Frequency;
+use drive_core::{Frequency, StopMode};
 use drive_fleet::{Band, Commanders, DriveSettings, FrequencyLimits};
 use rumqttc::{Packet, Publish, PublishProperties};
 use serde_json::{Value, json};
@@ -15,8 +15,11 @@ use crate::{
     desk::testing::{NO_OBJECTS, REFUSED, STOPS},
 };
 use drived_config::names::{Configured, Named};
-use drived_doors::Role;
-use drived_plant::plant::testing::TestPlant;
+use drived_doors::{Caller, Rights, Role};
+use drived_plant::plant::{
+    commands::{Action, LIFETIME, Request, Target},
+    testing::TestPlant,
+};
 
 fn config() -> MqttConfig {
     MqttConfig {
@@ -323,6 +326,41 @@ async fn a_command_that_was_held_up_on_its_way_from_the_broker_moves_no_motor() 
     bench.broker.release();
     a_while().await;
     assert!(!bench.runs(0), "a stop is never too late");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_start_that_a_stop_by_another_door_may_have_overtaken_on_its_way_is_not_begun() {
+    let bench = Bench::of(1).await;
+    let stop = || {
+        let caller = Caller::new("operator", "page", Rights::ALL);
+        let (target, action) = (Target::Drive("pump 1".to_owned()), Action::Stop(StopMode::Ramp.into()));
+        let request = Request { id: None, target, action, lifetime: LIFETIME, arrived: Instant::now() };
+        bench.plant.plant.begin(&caller, request).unwrap();
+    };
+    for held in [1_000, 2_000] {
+        bench.command(&start(&format!("runs-{held}")));
+        a_while().await;
+        // The way from the broker is held up, and somebody at the page stops the motor meanwhile.
+        bench.broker.hold();
+        bench.command(&start(&format!("overtaken-{held}")));
+        sleep(Duration::from_millis(held / 2)).await;
+        stop();
+        sleep(Duration::from_millis(held / 2)).await;
+        bench.broker.release();
+        a_while().await;
+        assert!(!bench.runs(0), "{:?}", bench.answers());
+        let told = bench.answers().pop().unwrap();
+        assert_eq!((&told["outcome"], &told["reason"]), (&"superseded".into(), &"stop".into()), "{told}");
+    }
+    bench.command(&start("behind"));
+    a_while().await;
+    assert!(bench.runs(0), "{:?}", bench.answers());
+    // What comes through the same door comes in its order, however long its broker has said nothing.
+    bench.ask("drive/pump_1/stop", "");
+    sleep(Duration::from_secs(4)).await;
+    bench.command(&start("again"));
+    a_while().await;
+    assert!(bench.runs(0), "{:?}", bench.answers());
 }
 
 #[tokio::test(start_paused = true)]

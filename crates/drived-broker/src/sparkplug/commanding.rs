@@ -91,6 +91,7 @@ impl Commanding {
                 pace_of: String::new(),
                 target: Some(Target::Drive(drive)),
                 arrived: arrived.at,
+                asked_after: None,
                 sent_unix_ms: timestamp,
                 lifetime: self.lifetime,
                 longest: None,

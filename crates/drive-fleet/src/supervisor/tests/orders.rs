@@ -180,6 +180,33 @@ fn limits_and_bands_refuse_a_setpoint_before_anything_is_sent() {
 }
 
 #[test]
+fn a_motor_that_is_turned_round_without_a_setpoint_keeps_the_limits_of_its_owner() {
+    let mut rig = Rig::ready();
+    rig.order(run_at(30));
+    rig.pass(1_000 * MS);
+    rig.drive.log.clear();
+    let reverse =
+        Order::Start { direction: Direction::Reverse, setpoint: None, until: crate::Until::default() };
+    // The limits of the fleet are others while it runs.
+    let up_to =
+        |hertz| FrequencyLimits { high: Some(Frequency::from_hertz(hertz)), ..FrequencyLimits::default() };
+    rig.machine.settings.limits = up_to(20);
+    let id = rig.order(reverse);
+    rig.pass(500 * MS);
+    assert!(matches!(rig.outcome(id), Some(Outcome::Refused(Refused::Limit(_)))), "{:?}", rig.outcome(id));
+    assert_eq!(rig.drive.writes(), []);
+    // Within them what was given is given again: another master may have written something else meanwhile.
+    rig.machine.settings.limits = up_to(35);
+    rig.order(reverse);
+    rig.pass(500 * MS);
+    let writes = rig.drive.writes();
+    assert!(
+        matches!(writes[..], [Job::SetSetpoint(given, _), Job::Start(Direction::Reverse)] if given == Frequency::from_hertz(30).into()),
+        "{writes:?}"
+    );
+}
+
+#[test]
 fn an_overloaded_queue_says_so() {
     let mut rig = Rig::ready();
     let ids: Vec<_> = (0..20).map(|_| rig.order(Order::ResetFaults)).collect();

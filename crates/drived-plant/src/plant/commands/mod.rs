@@ -191,6 +191,21 @@ impl Plant {
     /// # Errors
     /// [`Rejected`]: nothing was done.
     pub fn begin(&self, caller: &Caller, request: Request) -> Result<Told, Rejected> {
+        let asked_after = request.arrived;
+        self.begin_asked_after(caller, request, asked_after)
+    }
+
+    /// The same with what may have been on its way since `asked_after`, such as over a broker: a stop by another door since then may have
+    /// come after it, and it is not begun. What came through the same door came in its order.
+    ///
+    /// # Errors
+    /// [`Rejected`]: nothing was done.
+    pub fn begin_asked_after(
+        &self,
+        caller: &Caller,
+        request: Request,
+        asked_after: Instant,
+    ) -> Result<Told, Rejected> {
         let (has_right, right) = match request.action {
             Action::Stop(_) => (caller.rights.stop, "stop"),
             Action::Save => (caller.rights.engineer, "save parameters"),
@@ -220,7 +235,7 @@ impl Plant {
         }
         drop(groups);
         // Held until it is on its way: a start that has passed is not behind a stop that passes after it.
-        let _passed = self.0.stopped.pass(&request, &members)?;
+        let _passed = self.0.stopped.pass(caller, &request, asked_after, &members)?;
         let work = Work::new(self.clone(), caller, &request, members);
         match self.0.commands.find_or_add(caller, request, work.view())? {
             Found::Again(told) => Ok(told.subscribe()),
@@ -246,26 +261,53 @@ impl Plant {
     }
 }
 
-/// When a stop was last asked of each drive, by whichever face: what arrived before it is not begun after it.
+/// When a stop was last asked of each drive, by whichever face: what was asked before it is not begun after it.
 #[derive(Default)]
-pub(super) struct Stopped(Mutex<HashMap<String, Instant>>);
+pub(super) struct Stopped(Mutex<HashMap<String, LastStop>>);
+
+/// The last stop of a drive.
+struct LastStop {
+    at: Instant,
+    origin: String,
+    /// The last from elsewhere.
+    from_elsewhere: Option<Instant>,
+}
 
 /// Nothing else passes while this is there.
-type Passed<'a> = MutexGuard<'a, HashMap<String, Instant>>;
+type Passed<'a> = MutexGuard<'a, HashMap<String, LastStop>>;
 
 impl Stopped {
-    fn pass(&self, request: &Request, members: &[DriveHandle]) -> Result<Passed<'_>, Rejected> {
+    fn pass(
+        &self,
+        caller: &Caller,
+        request: &Request,
+        asked_after: Instant,
+        members: &[DriveHandle],
+    ) -> Result<Passed<'_>, Rejected> {
         let mut stopped = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let is_stop = matches!(request.action, Action::Stop(_));
         for member in members {
             let name = member.name().to_string();
+            let last = stopped.get(&name);
             if is_stop {
-                stopped.insert(name, Instant::now());
-            } else if stopped.get(&name).is_some_and(|at| *at > request.arrived) {
+                let from_elsewhere = last.and_then(|last| last.before(&caller.origin));
+                let origin = caller.origin.clone();
+                stopped.insert(name, LastStop { at: Instant::now(), origin, from_elsewhere });
+            } else if last.is_some_and(|last| {
+                let from_elsewhere = last.before(&caller.origin);
+                last.at > request.arrived || from_elsewhere.is_some_and(|at| at > asked_after)
+            }) {
                 return Err(Rejected::Stopped(name));
             }
         }
         Ok(stopped)
+    }
+}
+
+impl LastStop {
+    /// The last stop that did not come from there.
+    fn before(&self, origin: &str) -> Option<Instant> {
+        if self.origin == origin { self.from_elsewhere } else { Some(self.at) }
     }
 }
 
