@@ -267,7 +267,10 @@ fn what_is_written_wrongly_is_told_with_its_reason() {
         (Metric { value: Some(Raw::Float(f32::INFINITY)), ..good.clone() }, WriteError::NotItsType(name())),
         (Metric { value: None, ..good.clone() }, WriteError::NotItsType(name())),
         (Metric { is_null: true, ..good.clone() }, WriteError::NotItsType(name())),
-        (Metric { is_historical: true, ..good }, WriteError::Historical(name())),
+        (
+            Metric { is_historical: true, ..good },
+            WriteError::Historical(Write { name: name(), value: Value::Double(40.0) }),
+        ),
     ] {
         let payload = Payload { metrics: vec![metric], ..Payload::default() };
         assert_eq!(writes(rig.hear(PUMP, &payload.encode(), false)), [Err(problem)]);

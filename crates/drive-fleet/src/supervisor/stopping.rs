@@ -19,8 +19,10 @@ use crate::{
 /// The shortest and the longest pause between two attempts of a stop.
 pub(super) const REPEAT: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
 
-/// By how much the output has to come down to count as coming down.
-const PROGRESS: Frequency = Frequency::from_centihertz(50);
+/// By how much the output has to come down to count as coming down, and how long it may not before it hangs: the slowest ramp of all
+/// families, 3200 s from 50 Hz, takes it in 6.4 s.
+const PROGRESS: Frequency = Frequency::from_centihertz(10);
+const HANGS: Duration = Duration::from_secs(10);
 
 /// Longer than any exit: its own limit ends it.
 const EXIT: Duration = Duration::from_secs(86_400);
@@ -115,7 +117,7 @@ impl Stopping {
             .is_none_or(|lowest| output.centihertz() + PROGRESS.centihertz() <= lowest.centihertz());
         if is_progress {
             self.lowest = Some(output);
-            self.alarm_at = self.alarm_at.map(|at| at.max(now + standstill));
+            self.alarm_at = self.alarm_at.map(|_| now + standstill.min(HANGS));
             for waiter in &mut self.waiters {
                 waiter.until = waiter.until.max(now + standstill);
             }

@@ -100,7 +100,7 @@ pub struct Write {
 }
 
 /// Why a metric of a command is not written.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
     /// Neither its name nor its alias was in a birth.
@@ -109,9 +109,9 @@ pub enum WriteError {
     /// There is no value, or one of another type.
     #[error("metric {0:?} has no value of its type")]
     NotItsType(String),
-    /// It says that it is of the past.
-    #[error("metric {0:?} is of the past")]
-    Historical(String),
+    /// It says that it is of the past, and this.
+    #[error("metric {:?} is of the past", .0.name)]
+    Historical(Write),
 }
 
 /// Why a message is not used.

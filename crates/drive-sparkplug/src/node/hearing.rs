@@ -104,11 +104,9 @@ fn write(metrics: &Metrics, metric: &Metric) -> Result<Write, WriteError> {
         return Err(WriteError::Unknown(name.unwrap_or_else(alias)));
     };
     let name = definition.name.clone().into_owned();
-    if metric.is_historical {
-        return Err(WriteError::Historical(name));
-    }
     let raw = metric.value.as_ref().filter(|_| !metric.is_null);
     match metrics::read(definition, raw) {
+        Some(value) if metric.is_historical => Err(WriteError::Historical(Write { name, value })),
         Some(value) => Ok(Write { name, value }),
         None => Err(WriteError::NotItsType(name)),
     }

@@ -70,6 +70,14 @@ impl Commanding {
     pub(super) fn handle(&mut self, command: Command, arrived: &Arrived, is_alive: bool) {
         let Command { device, timestamp, is_retained, writes } = command;
         for write in writes {
+            // A stop is taken whenever it is from.
+            let (write, of_the_past) = match write {
+                Err(WriteError::Historical(write)) => {
+                    (Ok(write.clone()), Some(WriteError::Historical(write)))
+                }
+                write => (write, None),
+            };
+            let of_the_past = of_the_past.map(|error| Refusal::malformed(error.to_string()));
             let unborn = (!is_alive).then_some(Refusal::NotBorn);
             let undated = || Refusal::malformed("its payload has no timestamp: its age is not known");
             let undated = timestamp.is_none().then(undated);
@@ -77,7 +85,7 @@ impl Commanding {
             let lost = || self.plant.names_problem().map(Refusal::NamesLost);
             let doubt = if is_retained { Some(Refusal::Retained) } else { unborn.or(undated).or_else(lost) };
             let Some(device) = device.as_ref().map(|device| device.as_str().to_owned()) else {
-                self.handle_alarms(write, doubt, timestamp, arrived);
+                self.handle_alarms(write, of_the_past.or(doubt), timestamp, arrived);
                 continue;
             };
             // The drive that it is now; of one that is gone the name may be another's by now.
@@ -85,7 +93,7 @@ impl Commanding {
             let drive = drive.unwrap_or_else(|| format!("{device}, which is gone"));
             self.desk.take(Message {
                 needs_id: matches!(&write, Ok(write) if write.name == COMMAND),
-                doubt: read_only(&write).or(doubt),
+                doubt: read_only(&write).or(of_the_past).or(doubt),
                 said: said(write),
                 caller: self.caller.clone(),
                 pace_of: String::new(),

@@ -67,7 +67,13 @@ impl Bench {
 
     /// Writes a metric of a drive, as it is sent now.
     fn write(&self, drive: &str, name: &str, value: Raw) {
-        let metric = Metric { name: Some(name.to_owned()), value: Some(value), ..Metric::default() };
+        self.write_metric(
+            drive,
+            Metric { name: Some(name.to_owned()), value: Some(value), ..Metric::default() },
+        );
+    }
+
+    fn write_metric(&self, drive: &str, metric: Metric) {
         let payload = Payload { timestamp: Some(now().unix_ms), seq: None, metrics: vec![metric] };
         let mut message = publish(&format!("spBv1.0/plant/DCMD/hall 1/{drive}"), "", Qos::AtMostOnce);
         message.payload = payload.encode().into();
@@ -283,6 +289,25 @@ async fn a_stop_is_taken_whatever_else_it_says_and_under_its_id() {
         assert!(!bench.plant.machines[0].observe().running, "{text}");
         let told = last(&bench);
         assert_eq!([&told[0], &told[1]], ["s", "confirmed"], "{text}: {told:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_of_the_past_stops_and_a_start_of_the_past_starts_nothing() {
+    let bench = Bench::of(1, config("past")).await;
+    let command = |text: &str, is_historical| {
+        let (name, value) = (Some("Control/Command".to_owned()), Some(Raw::String(text.to_owned())));
+        bench.write_metric("pump 1", Metric { name, value, is_historical, ..Metric::default() });
+    };
+    let start = r#"{"id": "a", "action": "start", "setpoint": {"frequency_hz": 20}}"#;
+    for (text, is_historical, runs) in [
+        (start, true, false),
+        (&*start.replace("\"a\"", "\"b\""), false, true),
+        (r#"{"id": "c", "action": "stop"}"#, true, false),
+    ] {
+        command(text, is_historical);
+        sleep(Duration::from_secs(20)).await;
+        assert_eq!(bench.plant.machines[0].observe().running, runs, "{text}: {:?}", last(&bench));
     }
 }
 

@@ -7,6 +7,7 @@ mod last;
 pub mod parameters;
 pub mod past;
 mod progress;
+mod pulse;
 pub mod recent;
 pub mod revisions;
 pub mod tally;
@@ -44,6 +45,7 @@ use self::{
     last::LastCommands,
     parameters::Words,
     progress::Progress,
+    pulse::Pulse,
     recent::{Recent, RecentView},
     revisions::Revisions,
     tally::Tally,
@@ -73,6 +75,7 @@ struct Inner {
     commands: Log,
     /// When a stop was last asked of each drive.
     stopped: Stopped,
+    pulse: Pulse,
     /// One group starts at a time.
     group_starts: Mutex<()>,
     revisions: Revisions,
@@ -112,6 +115,7 @@ impl Plant {
             demo,
             commands: Log::default(),
             stopped: Stopped::default(),
+            pulse: Pulse::new(),
             group_starts: Mutex::default(),
             revisions: Revisions::new(),
             history: History::default(),
@@ -128,6 +132,7 @@ impl Plant {
             watched,
         });
         watching::start(&inner);
+        tokio::spawn(pulse::beat(Arc::downgrade(&inner)));
         history::start(&inner);
         Self(inner)
     }

@@ -88,6 +88,31 @@ fn a_stop_that_the_drive_takes_back_is_sent_again() {
 }
 
 #[test]
+fn a_ramp_that_hangs_is_an_alarm_after_ten_seconds_and_the_slowest_that_goes_on_is_none() {
+    for (falls, is_alarm) in [(false, true), (true, false)] {
+        let mut rig = Rig::ready();
+        rig.drive.run();
+        rig.pass(1_000 * MS);
+        rig.stop(StopMode::Ramp);
+        assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+        let braking = |centihertz| Status {
+            state: State::Stopping,
+            motion: Motion::Braking,
+            output_frequency: Some(Frequency::from_centihertz(centihertz)),
+            ..Status::default()
+        };
+        let taken = Stopped::by(StopMode::Ramp, braking(3_000));
+        rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(taken)));
+        // An Altivar 21 ramps for up to 3200 s (ACC, dEC): a tenth of a hertz in 6.4 s from 50 Hz.
+        for step in 0..4 {
+            rig.drive.status = braking(if falls { 3_000 - 10 * step } else { 3_000 });
+            rig.pass(6_400 * MS);
+        }
+        assert_eq!(rig.events().contains(&"stop unconfirmed"), is_alarm, "{falls}: {:?}", rig.events());
+    }
+}
+
+#[test]
 fn a_stop_mode_that_the_drive_replaces_is_told_with_the_reason_and_confirmed() {
     let mut rig = Rig::ready();
     rig.drive.run();

@@ -203,7 +203,7 @@ impl Plant {
     pub fn begin_asked_after(
         &self,
         caller: &Caller,
-        request: Request,
+        mut request: Request,
         asked_after: Instant,
     ) -> Result<Told, Rejected> {
         let (has_right, right) = match request.action {
@@ -217,6 +217,10 @@ impl Plant {
         self.0.note_commander(&caller.name);
         let fleet = self.fleet();
         let is_stop = matches!(request.action, Action::Stop(_));
+        if !is_stop {
+            request.arrived = self.0.pulse.asked_after(request.arrived);
+        }
+        let asked_after = asked_after.min(request.arrived);
         let may_be_less = is_stop && !matches!(request.target, Target::Drive(_));
         let mut members = Vec::new();
         // A reload gives no name to another drive meanwhile.
