@@ -26,7 +26,7 @@ pub(super) struct Clients(Mutex<HashMap<IpAddr, Client>>);
 #[derive(Debug)]
 struct Client {
     heard: Instant,
-    words: HashMap<Arc<str>, Word>,
+    words: HashMap<Arc<str>, (Word, Instant)>,
 }
 
 impl Clients {
@@ -35,9 +35,10 @@ impl Clients {
         self.with(peer, now, |client| client.heard = now);
     }
 
-    /// A client has written a command word to a drive; gives the one before it.
-    pub(super) fn write(&self, peer: IpAddr, drive: &Arc<str>, word: Word) -> Option<Word> {
-        self.with(peer, Instant::now(), |client| client.words.insert(Arc::clone(drive), word))
+    /// A client has written a command word to a drive; gives the one before it, and when that was.
+    pub(super) fn write(&self, peer: IpAddr, drive: &Arc<str>, word: Word) -> Option<(Word, Instant)> {
+        let now = Instant::now();
+        self.with(peer, now, |client| client.words.insert(Arc::clone(drive), (word, now)))
     }
 
     fn with<T>(&self, peer: IpAddr, now: Instant, act: impl FnOnce(&mut Client) -> T) -> T {

@@ -317,13 +317,18 @@ impl Desk {
                 None => Ok(()),
             };
         }
-        if before != Some(Word::WithoutRun) && !runs {
-            return Err(Refusal::rule(
-                "nothing starts by a run command that only goes on: write one without run first",
-            ));
-        }
+        // What was wished before a stop of somebody else is not wished behind it.
+        let asked_after = match before {
+            _ if runs => arrived,
+            Some((Word::WithoutRun, at)) => at,
+            _ => {
+                return Err(Refusal::rule(
+                    "nothing starts by a run command that only goes on: write one without run first",
+                ));
+            }
+        };
         self.plant.watched().start(watched(&self.config), peer, drive.name()).await;
-        self.order(caller, drive, action, arrived, deadline).await
+        self.order_asked_after(caller, drive, action, (arrived, asked_after), deadline).await
     }
 
     /// A step of the ladder is written as it is, so that the drive shows it. The motor stands, or it would be a stop.
@@ -391,13 +396,25 @@ impl Desk {
         arrived: Instant,
         deadline: Instant,
     ) -> Result<(), Refusal> {
+        self.order_asked_after(caller, drive, action, (arrived, arrived), deadline).await
+    }
+
+    /// The same where a stop by another door since a moment goes before it.
+    async fn order_asked_after(
+        &self,
+        caller: &Caller,
+        drive: &DriveHandle,
+        action: Action,
+        (arrived, asked_after): (Instant, Instant),
+        deadline: Instant,
+    ) -> Result<(), Refusal> {
         let left = || deadline.saturating_duration_since(Instant::now());
         let lifetime = deadline.saturating_duration_since(arrived).min(LONGEST_LIFETIME);
         let target = Target::Drive(drive.name().to_string());
         let request = Request { id: None, target, action, lifetime, arrived };
         let record = self.record(caller, drive, &request);
         record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
-        match self.plant.command(caller, request, left()).await {
+        match self.plant.command_asked_after(caller, request, asked_after, left()).await {
             Ok(view) => self.judged(drive, view.outcome, view.text.as_deref()),
             Err(Rejected::NoDrive(name)) => Err(Refusal::new(
                 ExceptionCode::GatewayPathUnavailable,

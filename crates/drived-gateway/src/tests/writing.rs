@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use drive_core::StopMode;
+use drive_core::{Direction, Frequency, StopMode};
 use drive_fleet::{EventKind, Received};
 use tokio::time::{Instant, sleep, timeout};
 
@@ -98,6 +98,23 @@ fn stop_of_all(arrived: Instant) -> (Caller, Request) {
     let (target, action, lifetime) =
         (Target::All, Action::Stop(StopMode::Ramp.into()), Duration::from_secs(1));
     (caller, Request { id: None, target, action, lifetime, arrived })
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_word_without_run_of_before_a_stop_by_somebody_else_lets_nothing_start_behind_it() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let mut peer = Peer::of(&desk);
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &write(LFR, 300)).await, write(LFR, 300));
+    sleep(Duration::from_secs(1)).await;
+    let (caller, request) = stop_of_all(Instant::now());
+    plant.plant.command(&caller, request, Duration::from_secs(30)).await.unwrap();
+    sleep(Duration::from_secs(1)).await;
+    let run = write(CMD, 0x000F);
+    assert_eq!(peer.ask(1, &run).await, [0x86, 0x04]);
+    assert!(!plant.machines[0].observe().running);
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &run).await, run, "a word without run behind the stop makes it a new one");
 }
 
 /// A run command that somebody writes cyclically is no wish to start again.
@@ -302,6 +319,24 @@ async fn the_motor_of_a_client_that_went_silent_is_stopped_where_told_so() {
             assert!(cause.contains("this program, by on_client_silence"), "{cause}");
         }
     }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_somebody_else_starts_behind_a_stop_is_not_stopped_for_the_silence_of_who_ran_it_before()
+{
+    let (plant, _desk, peer) = started_by_one_who_is_watched(true).await;
+    drop(peer);
+    let (caller, request) = stop_of_all(Instant::now());
+    plant.plant.command(&caller, request, Duration::from_secs(3)).await.unwrap();
+    let setpoint = Some(Frequency::from_hertz(25).into());
+    let action =
+        Action::Start { direction: Direction::Forward, setpoint, until: drive_fleet::Until::default() };
+    let (target, lifetime) = (Target::Drive("pump 1".to_owned()), Duration::from_secs(1));
+    let request = Request { id: None, target, action, lifetime, arrived: Instant::now() };
+    let told = plant.plant.command(&caller, request, Duration::from_secs(3)).await.unwrap();
+    assert!(plant.machines[0].observe().running, "{told:?}");
+    sleep(Duration::from_secs(60)).await;
+    assert!(plant.machines[0].observe().running, "its run is not his");
 }
 
 /// A motor that runs by a client that has to be heard every five seconds, or is stopped where told so; it goes on asking.

@@ -91,11 +91,11 @@ mod tests {
         };
         sleep(super::BEAT * 8).await;
         // As a process that is stopped: no timer of it runs meanwhile.
-        advance(Duration::from_secs(4)).await;
+        advance(Duration::from_secs(2)).await;
         let told = test.plant.command(&caller, start(), LIFETIME).await.unwrap();
         assert_eq!(told.outcome, OutcomeWord::Expired, "{told:?}");
         sleep(Duration::from_secs(2)).await;
-        advance(Duration::from_secs(4)).await;
+        advance(Duration::from_secs(2)).await;
         test.plant.begin(&caller, asked(Action::Stop(StopMode::Ramp.into()))).unwrap();
         assert!(matches!(test.plant.begin(&caller, start()), Err(Rejected::Stopped(_))));
         sleep(Duration::from_secs(20)).await;

@@ -78,6 +78,8 @@ pub struct Watch {
     heard: Instant,
     /// His silence was told.
     is_told: bool,
+    /// His run was to be stopped since: whoever starts the motor behind that starts another one.
+    is_stopped: bool,
 }
 
 /// Somebody who has been silent for too long.
@@ -120,7 +122,7 @@ impl Watched {
             BTreeMap::new()
         });
         let now = Instant::now();
-        let watch = |starter| Watch { starter, began: now, heard: now, is_told: false };
+        let watch = |starter| Watch { starter, began: now, heard: now, is_told: false, is_stopped: false };
         let kept = kept.into_iter().filter(|(drive, _)| runs(drive));
         let drives = kept.map(|(drive, starter)| (drive, watch(starter))).collect();
         Self { file, drives: Mutex::new(drives), ..Self::default() }
@@ -170,7 +172,7 @@ impl Watched {
             let mut drives = self.lock();
             let before = match starter.clone() {
                 Some(starter) => {
-                    let watch = Watch { starter, began: now, heard: now, is_told: false };
+                    let watch = Watch { starter, began: now, heard: now, is_told: false, is_stopped: false };
                     drives.insert(drive.to_owned(), watch)
                 }
                 // Whoever starts it now needs not be heard.
@@ -184,6 +186,22 @@ impl Watched {
         if self.file.is_some() {
             // A file that is not written holds up nothing.
             let _ = timeout(KEPT_WITHIN, is_kept.wait_for(|written| *written >= change)).await;
+        }
+    }
+
+    /// A drive is to be stopped by somebody.
+    pub(super) fn stop(&self, drive: &str) {
+        if let Some(watch) = self.lock().get_mut(drive) {
+            watch.is_stopped = true;
+        }
+    }
+
+    /// A drive is to be started. Who started it before a stop is not the one who has to be heard.
+    pub(super) fn start_anew(&self, drive: &str) {
+        let mut drives = self.lock();
+        if drives.get(drive).is_some_and(|watch| watch.is_stopped) {
+            drives.remove(drive);
+            self.change();
         }
     }
 

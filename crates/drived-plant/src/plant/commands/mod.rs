@@ -175,7 +175,22 @@ impl Plant {
         request: Request,
         wait: Duration,
     ) -> Result<Arc<CommandView>, Rejected> {
-        let told = self.begin(caller, request)?;
+        let asked_after = request.arrived;
+        self.command_asked_after(caller, request, asked_after, wait).await
+    }
+
+    /// The same, begun by [`begin_asked_after`](Self::begin_asked_after).
+    ///
+    /// # Errors
+    /// [`Rejected`]: nothing was done.
+    pub async fn command_asked_after(
+        &self,
+        caller: &Caller,
+        request: Request,
+        asked_after: Instant,
+        wait: Duration,
+    ) -> Result<Arc<CommandView>, Rejected> {
+        let told = self.begin_asked_after(caller, request, asked_after)?;
         Ok(settled(told, wait).await)
     }
 
@@ -240,6 +255,13 @@ impl Plant {
         drop(groups);
         // Held until it is on its way: a start that has passed is not behind a stop that passes after it.
         let _passed = self.0.stopped.pass(caller, &request, asked_after, &members)?;
+        for member in &members {
+            match request.action {
+                Action::Stop(_) => self.0.watched.stop(member.name()),
+                Action::Start { .. } => self.0.watched.start_anew(member.name()),
+                _ => {}
+            }
+        }
         let work = Work::new(self.clone(), caller, &request, members);
         match self.0.commands.find_or_add(caller, request, work.view())? {
             Found::Again(told) => Ok(told.subscribe()),
