@@ -283,3 +283,30 @@ fn a_motor_of_a_client_that_has_to_be_heard_is_stopped_when_line_drive_and_gatew
         assert!(!plant.shown().contains("running"), "{names:?}: {}", plant.shown());
     }
 }
+
+#[test]
+fn what_a_run_leaves_in_its_state_folder_is_what_the_readme_lists() {
+    let plant = Plant::new("kept-files");
+    run(&["token", "add", "scada", "--role", "view", "--config", plant.file.path()]).assert_done();
+    let (mut daemon, _client) = Client::of(&plant);
+    daemon.signal("-KILL");
+    assert_eq!(daemon.end().0, None);
+    let folder = fs::read_dir(&plant.state).expect("it is there");
+    let left: Vec<String> = folder
+        .map(|entry| entry.expect("it can be read").file_name().into_string().expect("it is text"))
+        .collect();
+    let readme = include_str!("../README.md");
+    let row = readme.lines().find_map(|line| line.strip_prefix("| `state` | ")).expect("it is documented");
+    let (list, _) = row.split_once(';').expect("the list ends");
+    let listed: Vec<&str> = list.split('`').skip(1).step_by(2).collect();
+    // Some have more beside them, by their own name: the log of SQLite, the audit log before this one.
+    let is_listed = |name: &String| listed.iter().any(|listed| name.starts_with(listed));
+    let unlisted: Vec<_> = left.iter().filter(|name| !is_listed(name)).collect();
+    assert!(unlisted.is_empty(), "{unlisted:?} of {left:?}, {listed:?}");
+    // What this run keeps in any case; the rest are of faces and commands that it has not.
+    for kept in
+        ["tokens", "audit", "runs.json", "watched.json", "names.json", "alarms.json", "history.sqlite"]
+    {
+        assert!(left.iter().any(|name| name == kept), "{kept}: {left:?}");
+    }
+}
