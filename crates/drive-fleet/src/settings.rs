@@ -343,7 +343,7 @@ impl RunRecord {
         lease: Option<Lease>,
         stop: Option<StopOrder>,
     ) -> Option<Self> {
-        let is_any = lease.is_some() || stop.is_some();
+        let is_any = lease.is_some() || crate::mutant!("stop-kept-with-a-run-alone", stop.is_some(), false);
         let record = || Self { identity: identity(), lease, stop: None, injection: None };
         is_any.then(|| record().stopped_by(stop))
     }
