@@ -37,11 +37,16 @@ fn plant_on(habits: Gateway, sleeps: Sleeps) -> Plant {
     let drives =
         (1..=3).map(|address| simulated.add(address, Atv312::under_bus_control()).unwrap()).collect();
     let gateway = simulated.behind(habits);
+    let line = line_over(&gateway, habits, sleeps);
+    Plant { drives, gateway, line }
+}
+
+/// A line over a connection of its own to the gateway.
+fn line_over(gateway: &GatewayInMemory, habits: Gateway, sleeps: Sleeps) -> Line {
     let protocol = if habits.rtu { Protocol::Rtu } else { Protocol::Tcp };
     let config = LineConfig { protocol, ..LineConfig::stream(SerialSettings::MODBUS_DEFAULT) };
     let far = gateway.clone();
-    let line = Line::over_reopened_by(move || ready(Ok(far.connect())), config, sleeps);
-    Plant { drives, gateway, line }
+    Line::over_reopened_by(move || ready(Ok(far.connect())), config, sleeps)
 }
 
 /// The ramp as the line tells it.
@@ -82,6 +87,24 @@ async fn in_two_hundred_reconnects_no_frame_of_the_last_connection_is_taken() {
     }
     println!("{right} right, {failed} failed");
     assert!(right > 100 * failed, "{right} right, {failed} failed");
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_a_server_has_kept_of_another_client_is_no_answer_over_the_next_port() {
+    for replays_when_asked in [true, false] {
+        let habits = Gateway { rtu: true, replays: 1, replays_when_asked, ..Gateway::default() };
+        let plant = plant(habits);
+        ramp(&plant.line, 1, 0).await.expect("it answers");
+        // Nothing that this line was answered last: nobody here can know that it is owed.
+        assert!(plant.drives[1].poke(ACC, 100));
+        let other = line_over(&plant.gateway, habits, Sleeps::new());
+        assert_eq!(ramp(&other, 2, 3).await, Ok(100));
+        drop(other);
+        assert!(plant.drives[1].poke(ACC, 200));
+        plant.gateway.cut();
+        sleep(100 * MS).await;
+        assert_eq!(ramp(&plant.line, 2, 3).await, Ok(200), "when it is asked: {replays_when_asked}");
+    }
 }
 
 #[tokio::test(start_paused = true)]

@@ -273,7 +273,8 @@ pub enum EventKind {
     },
     /// The run command of an earlier run of this program stands in the drive: it is ours again.
     RunAdopted(Lease),
-    /// There is a record of a run command of an earlier run of this program, and it is not ours: why.
+    /// There is a record of a run command, or of a stop, of an earlier run of this program, and it does not stand or is not of this
+    /// drive: why.
     RunNotAdopted(String),
     /// Other settings hold from now on: these.
     Reconfigured(Vec<&'static str>),

@@ -2,27 +2,27 @@
 
 use std::{sync::Arc, time::Duration};
 
-use drive_core::{Lease, StopMode};
+use drive_core::Lease;
 use tokio::{
     sync::{mpsc, oneshot},
     time::timeout,
 };
 
-use crate::settings::RunRecord;
+use crate::{settings::RunRecord, stop_order::StopOrder};
 
 /// How long a start waits at the most until its record is kept: a disk that hangs holds up no pump for ever. Less than half of
 /// the second that a command may wait, and that goes on meanwhile.
 const KEPT_WITHIN: Duration = Duration::from_millis(400);
 
-/// What is to be kept of a drive's run command from now on, in the order in which it is told. **A start waits until its record is
+/// What is to be kept of a drive's run command, and of a stop that is not confirmed, from now on, in the order in which it is told. **A start waits until its record is
 /// kept**, 0.4 s at the most, so that a program that is killed has told the next one of every motor that it started.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct RunKept {
     /// The drive.
     pub drive: Arc<str>,
-    /// The run command that stands, or is about to be given; `None`: none of this side stands any more, as the drive's own
-    /// words have shown.
+    /// The run command that stands, or is about to be given, and the stop that is not confirmed; `None`: none of this side stands any
+    /// more, and no stop is under way, as the drive's own words have shown.
     pub run: Option<RunRecord>,
     kept: Option<oneshot::Sender<()>>,
 }
@@ -59,27 +59,32 @@ impl Keeper {
         keeper
     }
 
-    /// The run command of this side as it stands now, and the stop that is to end it. The identity counts that the drive had when the
-    /// run command was given.
+    /// The run command of this side as it stands now, and the stop that is not confirmed. A stop outlives the run command that it ends,
+    /// as one by direct current does. The identity counts that the drive had when the run command was given, and of a stop alone that
+    /// which it said last.
     pub(crate) fn follow(
         &mut self,
         lease: Option<Lease>,
-        stop: Option<StopMode>,
+        stop: Option<StopOrder>,
         identity: impl FnOnce() -> Option<String>,
     ) {
-        let told = self.told.as_ref();
-        if told.map(|told| (told.lease, told.stop)) == lease.map(|lease| (lease, stop)) {
-            return;
+        let known = self.told.as_ref().filter(|told| lease.is_none() || told.lease == lease);
+        let known = known.map(|told| told.identity.clone());
+        let identity = || match lease {
+            Some(_) => known.unwrap_or_else(identity),
+            None => identity().or(known.flatten()),
+        };
+        let run = RunRecord::of(identity, lease, stop);
+        if run != self.told {
+            self.tell(run, None);
         }
-        let known = told.filter(|told| Some(told.lease) == lease).map(|told| told.identity.clone());
-        let run = lease.map(|lease| RunRecord { identity: known.unwrap_or_else(identity), lease, stop });
-        self.tell(run, None);
     }
 
-    /// A run command of which it is not known yet whether it is ours is to be stopped.
-    pub(crate) fn note_stop(&mut self, stop: StopMode) {
-        if let Some(told) = self.told.clone().filter(|told| told.stop != Some(stop)) {
-            self.tell(Some(RunRecord { stop: Some(stop), ..told }), None);
+    /// What was kept by an earlier run, and is not decided yet, is to be stopped.
+    pub(crate) fn note_stop(&mut self, stop: StopOrder) {
+        let noted = self.told.clone().map(|told| told.stopped_by(Some(stop)));
+        if noted != self.told {
+            self.tell(noted, None);
         }
     }
 
@@ -97,12 +102,12 @@ impl Keeper {
     }
 
     /// A run command is about to be given.
-    pub(crate) async fn before(&mut self, record: RunRecord) {
-        if self.keeps.is_none() || self.told.as_ref() == Some(&record) {
+    pub(crate) async fn before(&mut self, run: Option<RunRecord>) {
+        if self.keeps.is_none() || self.told == run {
             return;
         }
         let (kept, is_kept) = oneshot::channel();
-        self.tell(Some(record), Some(kept));
+        self.tell(run, Some(kept));
         // A keeper that has gone keeps nothing, and holds up nothing.
         let _ = timeout(KEPT_WITHIN, is_kept).await;
     }
@@ -121,25 +126,65 @@ impl Keeper {
 
 #[cfg(test)]
 mod tests {
-    use drive_core::Direction;
+    use drive_core::{Direction, StopMode};
 
     use super::*;
 
+    const RUN: Lease = Lease::new(Direction::Forward, 0x000F);
+
+    fn kept_of(mut kept: mpsc::UnboundedReceiver<RunKept>) -> Vec<Option<RunRecord>> {
+        std::iter::from_fn(|| kept.try_recv().ok()).map(|kept| kept.run).collect()
+    }
+
+    fn record(lease: Option<Lease>, stop: Option<StopOrder>) -> Option<RunRecord> {
+        RunRecord::of(|| Some("one".to_owned()), lease, stop)
+    }
+
     #[test]
     fn a_stop_is_kept_with_its_run_and_the_identity_of_the_start_until_it_is_over() {
-        let (keeps, mut kept) = mpsc::unbounded_channel();
+        let (keeps, kept) = mpsc::unbounded_channel();
         let mut keeper = Keeper::new(Arc::from("pump"), Some(keeps), None);
-        let lease = Lease::new(Direction::Forward, 0x000F);
-        let identity = Some("one".to_owned());
-        keeper.follow(Some(lease), None, || identity.clone());
+        keeper.follow(Some(RUN), None, || Some("one".to_owned()));
         // Its line was lost: it has not said anew which it is.
-        keeper.follow(Some(lease), Some(StopMode::Ramp), || None);
-        keeper.follow(Some(lease), Some(StopMode::Ramp), || None);
-        keeper.note_stop(StopMode::Fast);
+        keeper.follow(Some(RUN), Some(StopMode::Ramp.into()), || None);
+        keeper.follow(Some(RUN), Some(StopMode::Ramp.into()), || None);
+        keeper.note_stop(StopMode::Fast.into());
         keeper.follow(None, None, || None);
-        drop(keeper);
-        let record = |stop| Some(RunRecord { identity: identity.clone(), lease, stop });
-        let told: Vec<_> = std::iter::from_fn(|| kept.try_recv().ok()).map(|kept| kept.run).collect();
-        assert_eq!(told, [record(None), record(Some(StopMode::Ramp)), record(Some(StopMode::Fast)), None]);
+        let stopped = |mode: StopMode| record(Some(RUN), Some(mode.into()));
+        assert_eq!(
+            kept_of(kept),
+            [record(Some(RUN), None), stopped(StopMode::Ramp), stopped(StopMode::Fast), None]
+        );
+    }
+
+    #[test]
+    fn a_stop_is_kept_with_its_seconds_behind_the_run_command_that_it_has_ended() {
+        let (keeps, kept) = mpsc::unbounded_channel();
+        let mut keeper = Keeper::new(Arc::from("pump"), Some(keeps), None);
+        let held = Some(StopOrder::injecting(Duration::from_secs(20)));
+        keeper.follow(Some(RUN), None, || Some("one".to_owned()));
+        keeper.follow(Some(RUN), held, || None);
+        keeper.follow(None, held, || None);
+        // Direct current has brought it to rest, and is only to be ended.
+        keeper.follow(None, Some(StopMode::Ramp.into()), || None);
+        keeper.follow(None, None, || None);
+        let ramp = Some(StopMode::Ramp.into());
+        let told =
+            [record(Some(RUN), None), record(Some(RUN), held), record(None, held), record(None, ramp), None];
+        assert_eq!(kept_of(kept), told);
+    }
+
+    #[test]
+    fn a_stop_of_a_motor_that_somebody_else_runs_is_kept_with_the_drive_that_it_was_asked_of() {
+        let (keeps, kept) = mpsc::unbounded_channel();
+        let mut keeper = Keeper::new(Arc::from("pump"), Some(keeps), None);
+        let fast = Some(StopMode::Fast.into());
+        keeper.follow(None, fast, || None);
+        keeper.follow(None, fast, || Some("one".to_owned()));
+        // Its line was lost meanwhile.
+        keeper.follow(None, fast, || None);
+        keeper.follow(None, None, || None);
+        let of_nobody = RunRecord::of(|| None, None, fast);
+        assert_eq!(kept_of(kept), [of_nobody, record(None, fast), None]);
     }
 }

@@ -7,6 +7,7 @@ use drive_core::{Current, Identity, Lack, Lease, Percent, StopMode};
 use crate::{
     eeprom::EepromLedger,
     limits::FrequencyLimits,
+    stop_order::StopOrder,
     watchdog::{WatchdogBefore, WatchdogContract},
 };
 
@@ -132,7 +133,7 @@ settings! {
         pub identity: Option<Identity>,
         /// What was found of its communication watchdog before it was armed, where nobody lived to put that back.
         pub watchdog_before: Option<WatchdogBefore>,
-        /// The run command that may still stand in the drive.
+        /// The run command that may still stand in the drive, and the stop that was not confirmed.
         pub run_before: Option<RunRecord>,
         /// What earlier runs have written to its EEPROM.
         pub eeprom_before: Option<EepromLedger>,
@@ -147,7 +148,7 @@ pub struct Left {
     pub identity: Option<Identity>,
     /// The watchdog that was found, where it was armed and not put back.
     pub watchdog: Option<WatchdogBefore>,
-    /// The run command that may still stand in the drive.
+    /// The run command that may still stand in the drive, and the stop that was not confirmed.
     pub run: Option<RunRecord>,
     /// What was written to its EEPROM.
     pub eeprom: Option<EepromLedger>,
@@ -302,12 +303,13 @@ pub struct Alarms {
     pub motor_thermal: Option<Percent>,
 }
 
-/// A run command of this side, for whoever keeps it beyond the life of the program ([`RunKept`](crate::RunKept)) and gives it to
-/// the next as [`run_before`](DriveSettings::run_before): a program that was killed has stopped nothing.
+/// A run command of this side, or a stop that it has given and not seen confirmed, for whoever keeps it beyond the life of the program
+/// ([`RunKept`](crate::RunKept)) and gives it to the next as [`run_before`](DriveSettings::run_before): a program that was killed has
+/// stopped nothing, and ends no direct current that it has asked for.
 ///
-/// It is ours again only where the drive says that it is the same one and its own words show that this very run command stands.
-/// Else somebody else has started the motor. Where a [`stop`](Self::stop) of it was given and not confirmed, the same drive is stopped
-/// by it as soon as it has said that it is the same.
+/// The run command is ours again only where the drive says that it is the same one and its own words show that this very run command
+/// stands. Else somebody else has started the motor. Where a [`stop`](Self::stop) was given and not confirmed, whoever has started the
+/// motor, the same drive is stopped by it as soon as it has said that it is the same.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 #[non_exhaustive]
@@ -315,11 +317,46 @@ pub struct RunRecord {
     /// Which drive it was, as [`Identity`] is displayed; `None` where it does not say.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub identity: Option<String>,
-    /// The run command.
-    pub lease: Lease,
-    /// How the stop that was given of it, and not confirmed, was to stop it; `None`: it may go on.
+    /// The run command; `None`: none of this side stands, and a stop is to be given.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub lease: Option<Lease>,
+    /// How the stop that was given, and not confirmed, was to stop it; `None`: it may go on.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub stop: Option<StopMode>,
+    /// For how long direct current was to be held by that stop, where somebody has said so.
+    #[cfg_attr(
+        feature = "serde",
+        serde(
+            rename = "injection_ms",
+            default,
+            skip_serializing_if = "Option::is_none",
+            with = "drive_core::serialize::maybe_ms"
+        )
+    )]
+    pub injection: Option<Duration>,
+}
+
+impl RunRecord {
+    /// What there is to keep of a drive; `None`: nothing.
+    pub(crate) fn of(
+        identity: impl FnOnce() -> Option<String>,
+        lease: Option<Lease>,
+        stop: Option<StopOrder>,
+    ) -> Option<Self> {
+        let is_any = lease.is_some() || crate::mutant!("stop-kept-with-a-run-alone", stop.is_some(), false);
+        let record = || Self { identity: identity(), lease, stop: None, injection: None };
+        is_any.then(|| record().stopped_by(stop))
+    }
+
+    /// The same, to be stopped so.
+    pub(crate) fn stopped_by(self, stop: Option<StopOrder>) -> Self {
+        Self { stop: stop.map(|stop| stop.mode), injection: stop.and_then(StopOrder::injects_for), ..self }
+    }
+
+    /// The stop that is to be given.
+    pub(crate) fn stop_order(&self) -> Option<StopOrder> {
+        self.stop.map(|mode| StopOrder { mode, injection: self.injection })
+    }
 }
 
 /// What happens to a drive when the fleet shuts down (rule 8).

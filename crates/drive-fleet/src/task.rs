@@ -331,7 +331,8 @@ async fn carry_out(
         && let Some(word) = drive.run_word_for(direction)
     {
         let began = Instant::now();
-        keeper.before(RunRecord { identity, lease: Lease::new(direction, word), stop: None }).await;
+        let run = RunRecord::of(|| identity, Some(Lease::new(direction, word)), None);
+        keeper.before(run).await;
         // The disk's time is the order's: a start is not sent late for it (rule 2).
         lifetime = lifetime.map(|lifetime| lifetime.saturating_sub(began.elapsed()));
     }

@@ -711,6 +711,41 @@ fn the_readme_says_of_each_key_what_its_table_declares() {
     }
 }
 
+/// What the sources of all crates call a file of the state folder.
+fn called_a_file_of_the_state_folder() -> std::collections::BTreeSet<String> {
+    let mut found = std::collections::BTreeSet::new();
+    let mut folders = vec![std::path::PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.extend((!path.ends_with("target")).then_some(path));
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let text = std::fs::read_to_string(path).unwrap();
+                let behind = text.split("/// The file of the state folder.\n").skip(1);
+                found.extend(behind.filter_map(|rest| rest.split('"').nth(1)).map(str::to_owned));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn the_readme_lists_every_file_of_the_state_folder_and_no_other() {
+    let folder = Folder::new("state-files");
+    std::fs::write(folder.file("drives.toml"), format!("state = \".\"\n{BROKER}")).unwrap();
+    let state = Config::load(&folder.file("drives.toml")).unwrap().doors.state;
+    let source = Source { file: std::path::Path::new("drives.toml"), text: "" };
+    let own = [state.bd_seq(source, None), state.tokens, state.audit, state.watchdogs];
+    let own = own.into_iter().map(|file| file.unwrap().file_name().unwrap().to_str().unwrap().to_owned());
+    let kept: std::collections::BTreeSet<String> = own.chain(called_a_file_of_the_state_folder()).collect();
+    let readme = include_str!("../../drived/README.md");
+    let row = readme.lines().find_map(|line| line.strip_prefix("| `state` | ")).unwrap();
+    let (list, _) = row.split_once(';').unwrap();
+    let listed = list.split('`').skip(1).step_by(2).map(str::to_owned).collect();
+    assert_eq!(kept, listed);
+}
+
 #[test]
 fn a_key_that_says_its_default_changes_nothing() {
     let file = |[top, line, drive, gateway, webhook]: [&str; 5]| {

@@ -55,6 +55,15 @@ impl Plant {
         self.state.join("runs.json")
     }
 
+    fn kept(&self) -> String {
+        fs::read_to_string(self.record()).expect("it is there")
+    }
+
+    /// What the daemon that runs shows of it.
+    fn daemon_shows(&self) -> String {
+        run(&["status", "pump", "--socket", &self.socket]).out
+    }
+
     /// What the drive shows to somebody who only asks.
     fn shown(&self) -> String {
         self.sim.on("atv312@1", &["status"]).out
@@ -78,8 +87,7 @@ fn a_run_of_a_killed_daemon_is_ours_again_after_its_restart_and_the_exit_stops_i
     assert!(last.contains(r#""action":"stopped""#), "{last}");
     let shown = plant.shown();
     assert!(shown.contains("0.00 Hz") && !shown.contains("running"), "{shown}");
-    let kept = fs::read_to_string(plant.record()).expect("it is there");
-    assert_eq!(kept.trim(), "{}", "it was seen to stand no more");
+    assert_eq!(plant.kept().trim(), "{}", "it was seen to stand no more");
 }
 
 #[test]
@@ -91,7 +99,7 @@ fn a_stop_that_was_not_confirmed_when_the_daemon_was_killed_is_given_anew_by_the
     plant.sim.say("line cut", "done");
     let stopped = run(&["stop", "pump", "--socket", &plant.socket]);
     assert_ne!(stopped.code, Some(0), "{stopped:?}");
-    let record = fs::read_to_string(plant.record()).expect("it is kept");
+    let record = plant.kept();
     assert!(record.contains(r#""stop": "ramp""#), "{record}");
     daemon.signal("-KILL");
     assert_eq!(daemon.end().0, None);
@@ -99,11 +107,55 @@ fn a_stop_that_was_not_confirmed_when_the_daemon_was_killed_is_given_anew_by_the
     let mut daemon = plant.daemon();
     let confirmed = daemon.wait_for(r#""event":"stop_confirmed""#);
     assert!(confirmed.contains("stop_of_before"), "{confirmed}");
-    let kept = || fs::read_to_string(plant.record()).expect("it is there");
     let (code, last) = daemon.interrupt();
     assert_eq!(code, Some(0), "{last}");
     assert!(!plant.shown().contains("running"), "{}", plant.shown());
-    assert_eq!(kept().trim(), "{}", "it was seen to stand no more");
+    assert_eq!(plant.kept().trim(), "{}", "it was seen to stand no more");
+}
+
+#[test]
+fn a_stop_by_direct_current_whose_daemon_was_killed_is_ended_by_the_next_one() {
+    let plant = Plant::new("kept-injection");
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"identified""#);
+    run(&["start", "pump", "--setpoint", "20Hz", "--socket", &plant.socket]).assert_done();
+    let _stop = Running::start(&["stop", "pump", "--injection", "10", "--socket", &plant.socket]);
+    daemon.wait_for(r#""to":"stopping""#);
+    daemon.signal("-KILL");
+    assert_eq!(daemon.end().0, None);
+    // Bit 13 of CMD is a level on which the drive injects (BBV51701 p. 8): nothing of its own ends that.
+    assert!(plant.shown().contains("stopping"), "{}", plant.shown());
+    let mut daemon = plant.daemon();
+    let confirmed = daemon.wait_for(r#""event":"stop_confirmed""#);
+    assert!(confirmed.contains("stop_of_before"), "{confirmed}");
+    let shown = plant.daemon_shows();
+    assert!(!shown.contains("stopping"), "no current flows any more: {shown}");
+    let (code, last) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{last}");
+    assert_eq!(plant.kept().trim(), "{}", "it was seen to end");
+}
+
+#[test]
+fn a_stop_of_a_motor_that_was_not_started_here_is_given_anew_by_the_next_daemon_where_it_was_not_confirmed() {
+    let mut plant = Plant::new("kept-stop-of-others");
+    let started = plant.sim.on("atv312@1", &["start", "--setpoint", "20Hz"]);
+    assert_eq!(started.code, Some(0), "{started:?}");
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"identified""#);
+    plant.sim.say("line cut", "done");
+    let stopped = run(&["stop", "pump", "--socket", &plant.socket]);
+    assert_ne!(stopped.code, Some(0), "{stopped:?}");
+    daemon.signal("-KILL");
+    assert_eq!(daemon.end().0, None);
+    plant.sim.say("line join", "done");
+    assert!(plant.shown().contains("running"), "{}", plant.shown());
+    let mut daemon = plant.daemon();
+    let confirmed = daemon.wait_for(r#""event":"stop_confirmed""#);
+    assert!(confirmed.contains("stop_of_before"), "{confirmed}");
+    let (code, last) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{last}");
+    assert!(!plant.shown().contains("running"), "{}", plant.shown());
+    assert_eq!(plant.kept().trim(), "{}", "it was seen to stand");
 }
 
 #[test]
@@ -149,7 +201,7 @@ fn a_reload_that_gives_a_turning_drive_and_its_line_another_name_leaves_its_run_
     daemon.signal("-HUP");
     let adopted = daemon.wait_for(r#""event":"run_adopted""#);
     assert!(adopted.contains("\"fan\""), "{adopted}");
-    let record = fs::read_to_string(plant.record()).expect("it is kept");
+    let record = plant.kept();
     assert!(record.contains("\"fan\""), "a kill would be outlived, too: {record}");
     let shown = run(&["status", "fan", "--socket", &plant.socket]);
     assert!(shown.out.contains("running"), "it was not touched: {}", shown.out);
@@ -229,5 +281,32 @@ fn a_motor_of_a_client_that_has_to_be_heard_is_stopped_when_line_drive_and_gatew
         let (code, rest) = daemon.interrupt();
         assert_eq!(code, Some(0), "{rest}");
         assert!(!plant.shown().contains("running"), "{names:?}: {}", plant.shown());
+    }
+}
+
+#[test]
+fn what_a_run_leaves_in_its_state_folder_is_what_the_readme_lists() {
+    let plant = Plant::new("kept-files");
+    run(&["token", "add", "scada", "--role", "view", "--config", plant.file.path()]).assert_done();
+    let (mut daemon, _client) = Client::of(&plant);
+    daemon.signal("-KILL");
+    assert_eq!(daemon.end().0, None);
+    let folder = fs::read_dir(&plant.state).expect("it is there");
+    let left: Vec<String> = folder
+        .map(|entry| entry.expect("it can be read").file_name().into_string().expect("it is text"))
+        .collect();
+    let readme = include_str!("../README.md");
+    let row = readme.lines().find_map(|line| line.strip_prefix("| `state` | ")).expect("it is documented");
+    let (list, _) = row.split_once(';').expect("the list ends");
+    let listed: Vec<&str> = list.split('`').skip(1).step_by(2).collect();
+    // Some have more beside them, by their own name: the log of SQLite, the audit log before this one.
+    let is_listed = |name: &String| listed.iter().any(|listed| name.starts_with(listed));
+    let unlisted: Vec<_> = left.iter().filter(|name| !is_listed(name)).collect();
+    assert!(unlisted.is_empty(), "{unlisted:?} of {left:?}, {listed:?}");
+    // What this run keeps in any case; the rest are of faces and commands that it has not.
+    for kept in
+        ["tokens", "audit", "runs.json", "watched.json", "names.json", "alarms.json", "history.sqlite"]
+    {
+        assert!(left.iter().any(|name| name == kept), "{kept}: {left:?}");
     }
 }

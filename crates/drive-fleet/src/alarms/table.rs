@@ -2,6 +2,8 @@
 
 use std::{fmt, time::Duration};
 
+use drive_core::INJECTION_AT_MOST;
+
 use crate::concern::{ConcernKind, Severity};
 
 /// A drive that was never seen is an alarm after this time: at a start nobody has been seen yet.
@@ -112,6 +114,13 @@ impl AlarmKind {
                 Severity::Warning,
                 "look at its supply, its address and its cable",
             ),
+            // No stop of here holds it for longer than it has to last: whatever does heats a motor that stands, and ends it nowhere.
+            Self::Drive(ConcernKind::Held) => row(
+                ConcernKind::Held.word(),
+                ConcernKind::Held.words(),
+                Severity::Warning,
+                ConcernKind::Held.remedy(),
+            ),
             Self::Drive(kind) => row(kind.word(), kind.words(), kind.severity(), kind.remedy()),
         }
     }
@@ -161,6 +170,7 @@ impl AlarmKind {
     pub const fn lasts_at_least(self) -> Duration {
         match self {
             Self::Drive(ConcernKind::NeverSeen) => SEEN_WITHIN,
+            Self::Drive(ConcernKind::Held) => INJECTION_AT_MOST,
             _ => Duration::ZERO,
         }
     }

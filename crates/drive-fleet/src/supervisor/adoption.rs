@@ -1,4 +1,4 @@
-//! A run command that an earlier run of the program has given: ours again only where the record of it, the drive's identity
+//! A run command that an earlier run of the program has given, and a stop: the run command is ours again only where the record of it, the drive's identity
 //! and the drive's own words agree. Without all three somebody else has started the motor.
 
 use drive_core::{Lease, Verdict};
@@ -40,22 +40,29 @@ impl Supervisor {
             _ if !self.settings.control => "the drive is only read",
             _ if crate::mutant!(
                 "run-of-another-drive-adopted",
-                self.says_what_it_is() == record.identity && !self.checks.is_another(),
+                self.is_drive_of(record) && !self.checks.is_another(),
                 true
             ) =>
             {
-                let (lease, stop) = (record.lease, record.stop);
-                self.adoption = Adoption::Due(lease);
+                let stop = record.stop_order();
+                self.adoption = record.lease.map_or(Adoption::Decided, Adoption::Due);
                 self.pace.hurry(now);
-                // It is ours, and not to go on: whoever has given its stop has not seen it confirmed.
-                if let Some(mode) = crate::mutant!("stop-of-before-forgotten", stop, None) {
-                    self.stop_by_policy(now, Asker::Policy(Policy::StopOfBefore), mode);
+                // Whoever turns it, it is not to go on: who has given its stop has not seen it confirmed.
+                if let Some(stop) = crate::mutant!("stop-of-before-forgotten", stop, None) {
+                    self.stop_by_policy(now, Asker::Policy(Policy::StopOfBefore), stop);
                 }
                 return;
             }
+            _ if record.lease.is_none() => "a stop of before was given to another drive than answers here",
             _ => "it was given to another drive than answers here",
         };
         self.not_adopted(why.to_owned());
+    }
+
+    /// Whether this is the drive of a record. A stop that was asked of one that had never said which it is goes to whoever answers.
+    fn is_drive_of(&self, record: &RunRecord) -> bool {
+        let is_of_nobody = record.lease.is_none() && record.identity.is_none();
+        is_of_nobody || self.says_what_it_is() == record.identity
     }
 
     /// What the drive says of itself, where it does.
@@ -67,11 +74,11 @@ impl Supervisor {
     pub(super) fn unadopted(&self) -> Option<RunRecord> {
         match &self.adoption {
             Adoption::Kept(record) => {
-                Some(RunRecord { stop: self.stop_under_way().or(record.stop), ..record.clone() })
+                let stop = self.stop_under_way().or_else(|| record.stop_order());
+                Some(record.clone().stopped_by(stop))
             }
             Adoption::Due(lease) => {
-                let (identity, stop) = (self.says_what_it_is(), self.stop_under_way());
-                Some(RunRecord { identity, lease: *lease, stop })
+                RunRecord::of(|| self.says_what_it_is(), Some(*lease), self.stop_under_way())
             }
             Adoption::Decided | Adoption::Asked => None,
         }

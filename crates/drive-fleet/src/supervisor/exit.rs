@@ -104,16 +104,12 @@ impl Supervisor {
     pub(crate) fn left(&self) -> Left {
         let is_another = self.checks.is_another();
         let lease = self.lease.filter(|_| !is_another);
+        let unadopted = || lease.is_none().then(|| self.unadopted()).flatten();
         Left {
             identity: self.checks.remembered(),
             watchdog: self.checks.left(),
-            run: lease
-                .map(|lease| RunRecord {
-                    identity: self.says_what_it_is(),
-                    lease,
-                    stop: self.stop_under_way(),
-                })
-                .or_else(|| self.unadopted()),
+            run: unadopted()
+                .or_else(|| RunRecord::of(|| self.says_what_it_is(), lease, self.stop_under_way())),
             eeprom: (self.ledger.kept.writes > 0).then(|| self.ledger.kept.clone()),
         }
     }

@@ -163,13 +163,15 @@ impl Supervisor {
     }
 
     /// Stops for a policy.
-    pub(super) fn stop_by_policy(&mut self, now: Instant, asker: Asker, mode: StopMode) {
-        self.begin_stop(now, asker, mode.into(), self.settings.times.stop_alarm);
+    pub(super) fn stop_by_policy(&mut self, now: Instant, asker: Asker, stop: impl Into<StopOrder>) {
+        self.begin_stop(now, asker, stop.into(), self.settings.times.stop_alarm);
     }
 
-    /// How the stop that is given and not confirmed yet is to stop it.
-    pub(crate) fn stop_under_way(&self) -> Option<StopMode> {
-        self.stopping.as_ref().map(|stopping| stopping.asked)
+    /// How the stop that is given and not confirmed yet is to stop it from now on: direct current that has brought it to rest is only to
+    /// be ended.
+    pub(crate) fn stop_under_way(&self) -> Option<StopOrder> {
+        let order = |stopping: &Stopping| StopOrder { mode: stopping.mode, injection: stopping.injection };
+        self.stopping.as_ref().map(order)
     }
 
     /// For how long direct current is to be held now.

@@ -118,7 +118,9 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let builder = build(&config, &lines, before).keep_runs(tell_runs);
     let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
     // Nobody is watched any more for a run that was ended.
-    let watched = Watched::in_folder(state.folder.as_deref(), |drive| started.of(drive).is_some());
+    let watched = Watched::in_folder(state.folder.as_deref(), |drive| {
+        started.of(drive).is_some_and(|run| run.lease.is_some())
+    });
     let kept = runs::follow(started, told_runs);
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
     let with_table = !args.json && logging::may_be_shown();

@@ -491,7 +491,7 @@ struct Leaving {
 impl Leaving {
     fn of(plant: &Plant, place: Place, drive: &DriveHandle) -> Self {
         let (left, watch) = (drive.left(), plant.watched().take(drive.name()));
-        let watch = watch.filter(|_| left.run.is_some());
+        let watch = watch.filter(|_| left.run.as_ref().is_some_and(|run| run.lease.is_some()));
         Self { place, left, watch }
     }
 }

@@ -136,6 +136,21 @@ fn a_drive_that_was_never_seen_is_an_alarm_after_a_minute() {
 }
 
 #[test]
+fn a_shaft_that_direct_current_holds_for_longer_than_any_stop_of_here_is_an_alarm() {
+    let now = Instant::now();
+    let mut drive = showing(State::Stopping, Motion::Held, now);
+    drive.since = vec![(ConcernKind::Held, now)];
+    // The longest time for which anybody can have it injected here.
+    for (seconds, is_alarm) in [(29, false), (31, true)] {
+        let at = now + Duration::from_secs(seconds);
+        drive.status = showing(State::Stopping, Motion::Held, at).status;
+        let mut alarms = Alarms::default();
+        alarms.look(&[Look::at_drive("north", &drive, moment(at))], 10);
+        assert_eq!(is_active(&alarms, ConcernKind::Held), is_alarm, "after {seconds} s");
+    }
+}
+
+#[test]
 fn a_line_is_silent_when_nobody_of_several_answers_and_back_when_one_does() {
     let now = Instant::now();
     let (dead, living) =

@@ -16,7 +16,7 @@ fn restarted(record: Option<RunRecord>, stands: Option<Lease>) -> Rig {
 
 /// As the program of before has kept it.
 fn record(rig: &Rig) -> Option<RunRecord> {
-    Some(RunRecord { identity: Some(rig.drive.identity.to_string()), lease: RUN, stop: None })
+    RunRecord::of(|| Some(rig.drive.identity.to_string()), Some(RUN), None)
 }
 
 fn exits(rig: &mut Rig) -> Option<ExitAction> {
@@ -68,8 +68,8 @@ fn a_run_without_a_record_is_somebody_elses_whatever_word_stands() {
 
 #[test]
 fn a_record_of_another_drive_makes_no_run_ours() {
-    let other = RunRecord { identity: Some("two".to_owned()), lease: RUN, stop: None };
-    let mut rig = restarted(Some(other), Some(RUN));
+    let other = RunRecord::of(|| Some("two".to_owned()), Some(RUN), None);
+    let mut rig = restarted(other, Some(RUN));
     assert!(rig.events().contains(&"run not adopted"), "{:?}", rig.events());
     assert!(!rig.snapshot().started_here());
     assert_eq!(exits(&mut rig), Some(ExitAction::LeftTurning));
@@ -102,7 +102,7 @@ fn a_record_waits_for_a_drive_that_is_away_when_the_program_starts() {
 
 /// As a program that was killed with a stop under way has kept it.
 fn to_be_stopped(mode: StopMode) -> DriveSettings {
-    let run_before = record(&Rig::controlled()).map(|record| RunRecord { stop: Some(mode), ..record });
+    let run_before = record(&Rig::controlled()).map(|record| record.stopped_by(Some(mode.into())));
     DriveSettings { run_before, ..settings() }
 }
 
@@ -131,7 +131,7 @@ fn a_stop_of_before_is_repeated_until_it_is_confirmed_and_kept_until_then() {
     assert!(rig.drive.writes().len() > 10, "{:?}", rig.drive.writes());
     assert!(rig.events().contains(&"stop unconfirmed"), "{:?}", rig.events());
     let kept = rig.machine.left().run.expect("it stands");
-    assert_eq!((kept.lease, kept.stop), (RUN, Some(StopMode::Ramp)));
+    assert_eq!((kept.lease, kept.stop), (Some(RUN), Some(StopMode::Ramp)));
     rig.drive.refuses_stops = false;
     rig.pass(3_000 * MS);
     assert!(rig.events().contains(&"stop confirmed"), "{:?}", rig.events());
@@ -157,6 +157,84 @@ fn a_stop_of_before_waits_for_a_drive_that_is_away_and_stops_no_other_drive() {
     rig.drive.run();
     rig.pass(3_000 * MS);
     assert_eq!(rig.drive.writes(), [], "whoever has started it goes on");
+}
+
+/// As a program that was killed has kept a stop of a motor that it had not started.
+fn somebody_elses_to_be_stopped(identity: Option<&str>) -> DriveSettings {
+    let identity = identity.map(str::to_owned);
+    DriveSettings { run_before: RunRecord::of(|| identity, None, Some(StopMode::Fast.into())), ..settings() }
+}
+
+#[test]
+fn a_stop_of_before_of_a_motor_that_was_not_started_here_is_given_anew_and_kept_until_it_is_confirmed() {
+    let one = Rig::controlled().drive.identity.to_string();
+    // One that had never said which it was is whoever is there.
+    for identity in [Some(&*one), None] {
+        let mut rig = Rig::new(somebody_elses_to_be_stopped(identity));
+        rig.drive.run();
+        rig.drive.refuses_stops = true;
+        rig.pass(10_000 * MS);
+        let kept = rig.machine.left().run.expect("it is not confirmed");
+        assert_eq!((kept.lease, kept.stop), (None, Some(StopMode::Fast)));
+        rig.drive.refuses_stops = false;
+        rig.pass(3_000 * MS);
+        let cause = Cause::Policy { policy: Policy::StopOfBefore };
+        assert_eq!(rig.cause_of("stop confirmed"), Some(cause), "{:?}", rig.events());
+        assert!(rig.drive.writes().starts_with(&[Job::Stop(StopMode::Fast)]), "{:?}", rig.drive.writes());
+        assert!(!rig.events().contains(&"run not adopted"), "there was none: {:?}", rig.events());
+        assert_eq!(rig.machine.left().run, None);
+    }
+}
+
+#[test]
+fn a_stop_of_before_of_a_motor_that_was_not_started_here_stops_no_other_drive_and_says_so() {
+    let mut rig = Rig::new(somebody_elses_to_be_stopped(Some("two")));
+    rig.drive.run();
+    rig.pass(3_000 * MS);
+    assert_eq!(rig.drive.writes(), [], "whoever has started it goes on");
+    assert!(rig.events().contains(&"run not adopted"), "{:?}", rig.events());
+}
+
+#[test]
+fn a_stop_by_direct_current_is_left_with_its_seconds_and_then_with_the_ramp_that_ends_it() {
+    let held = StopOrder::injecting(Duration::from_secs(20));
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    rig.stop(held);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
+    // It brakes: the run command has gone already.
+    rig.drive.status.state = State::Stopping;
+    rig.drive.status.motion = Motion::Braking;
+    let stopped = Stopped::by(StopMode::DcInjection, rig.drive.status.clone());
+    rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(stopped)));
+    let left = |rig: &Rig| rig.machine.left().run.map(|run| (run.lease, run.stop_order()));
+    assert_eq!(left(&rig), Some((None, Some(held))), "nobody else ends it");
+    rig.drive.status.motion = Motion::Held;
+    let status = rig.drive.status();
+    rig.machine.handle_reply(rig.now, Reply::Status(status));
+    assert_eq!(left(&rig), Some((None, Some(StopMode::Ramp.into()))));
+}
+
+#[test]
+fn a_stop_of_before_by_direct_current_has_its_seconds_and_is_ended() {
+    let held = StopOrder::injecting(Duration::from_secs(20));
+    let identity = Rig::controlled().drive.identity.to_string();
+    let run_before = RunRecord::of(|| Some(identity), None, Some(held));
+    let mut rig = Rig::new(DriveSettings { run_before, ..settings() });
+    rig.drive.status.state = State::Stopping;
+    rig.drive.status.motion = Motion::Braking;
+    let until = rig.now + 3_000 * MS;
+    while !rig.drive.log.contains(&Job::Stop(StopMode::DcInjection)) {
+        assert!(rig.now < until, "{:?}", rig.events());
+        rig.pass(10 * MS);
+    }
+    assert_eq!(rig.machine.injection(), held.injection);
+    rig.pass(3_000 * MS);
+    let writes = rig.drive.writes();
+    let injected = [Job::Stop(StopMode::DcInjection), Job::Stop(StopMode::Ramp)];
+    assert!(writes.starts_with(&injected), "it would heat a motor that stands: {writes:?}");
+    assert!(rig.events().contains(&"stop confirmed"), "{:?}", rig.events());
 }
 
 const AN_ATV71: Recognised = Recognised::NotMine { it_is: "an Altivar 71, which no family here fits" };
