@@ -262,6 +262,18 @@ async fn a_drive_that_still_holds_what_it_was_given_behind_a_lost_line_counts_as
     assert_eq!(machine.peek(2), Some(500), "of 0.01 Hz");
 }
 
+/// What a second master has set in 0001h does not outlive the supply, and a start does not set it again.
+#[tokio::test(start_paused = true)]
+async fn inputs_that_a_power_cut_has_ended_are_not_set_again_by_a_start() {
+    let (mut drive, machine, _rig) = one();
+    machine.written_by_another(1, 0x10).unwrap();
+    drive.status().await.unwrap();
+    machine.power_cycle();
+    drive.status().await.unwrap();
+    drive.start(Direction::Forward).await.unwrap();
+    assert_eq!(machine.peek(1), Some(1));
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_fault_is_reset_by_one_pulse_of_the_input_that_carries_it_and_nothing_starts() {
     let (mut drive, machine, _rig) = running().await;
