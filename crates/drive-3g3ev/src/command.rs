@@ -39,8 +39,9 @@ impl<P: Port> Drive3g3ev<P> {
 
     pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
         self.check_start(direction).await?;
-        // The inputs of n06 to n08 stand in the same word, and are left as they are.
-        if self.command.is_none() {
+        // The inputs of n06 to n08 stand in the same word, and are left as they are: as they are now, where one was on, for they do not
+        // outlive the supply.
+        if self.command.is_none_or(|held| held.intersects(Command::INPUTS)) {
             self.read_command(Class::Command).await?;
         }
         let word = Command::run(direction) | self.inputs();
