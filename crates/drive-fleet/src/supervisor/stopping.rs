@@ -344,7 +344,7 @@ impl Supervisor {
                     stopping.comes_down(now, output, standstill);
                 }
                 // Another drive that stands there says nothing of the motor that was to be stopped.
-                if !is_known && !(is_another && stopping.of_another) {
+                if !(is_known || is_another && stopping.of_another) {
                     return;
                 }
                 self.tell_taken(at);
