@@ -48,6 +48,25 @@ async fn rule_1_a_stop_is_repeated_until_the_drive_confirms_it_and_ends_in_an_al
 }
 
 #[tokio::test(start_paused = true)]
+async fn rule_1_a_motor_that_a_start_under_way_turns_is_known_as_started_here_while_nobody_has_confirmed_it()
+{
+    each(async |family| {
+        let plant = Plant::single(family, |_| {});
+        plant.motor().ready(60 * SECOND).await.expect("it gets ready");
+        assert!(!plant.motor().snapshot().started_here(), "{family}");
+        let started = plant.motor().run(Direction::Forward, Frequency::from_hertz(20));
+        while !plant.machine().observe().running {
+            sleep(Duration::from_millis(1)).await;
+        }
+        assert!(plant.motor().snapshot().started_here(), "{family}");
+        assert!(started.await.is_confirmed(), "{family}");
+        assert!(plant.motor().stop(StopMode::Ramp).await.is_confirmed(), "{family}");
+        assert!(!plant.motor().snapshot().started_here(), "{family}");
+    })
+    .await;
+}
+
+#[tokio::test(start_paused = true)]
 async fn rule_1_a_drive_whose_settings_have_no_ramp_stop_is_stopped_by_another() {
     let mut plant = Plant::single(Family::ATV312, |_| {});
     // The normal stop is a freewheel stop: no word of the bus stops this drive along its ramp.

@@ -92,7 +92,7 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
     let controls = [Control::Bus, Control::Terminals, Control::Panel, Control::Local, Control::OtherBus];
     let mut refusals: Vec<Refusal> = controls.map(Refusal::NotInControl).to_vec();
     refusals.extend([Refusal::Tripped, Refusal::DirectionForbidden, Refusal::NothingToSave]);
-    refusals.extend([Refusal::EepromLife, Refusal::MotorRunning]);
+    refusals.extend([Refusal::EepromLife, Refusal::MotorRunning, Refusal::Exchanged]);
     sentences.extend(refusals.iter().map(ToString::to_string));
     assert!(sentences.len() > 70, "only {} sentences were found", sentences.len());
     let missing: Vec<String> =

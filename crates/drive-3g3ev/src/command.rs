@@ -19,6 +19,7 @@ impl<P: Port> Drive3g3ev<P> {
     /// Refuses a start that would not come into force, before anything is written.
     pub(crate) async fn check_start(&mut self, direction: Direction) -> Result<()> {
         let order = Order::Start(direction);
+        self.look_at_unit().await?;
         let status = self.read_status(Class::Command).await?;
         if status.is_fault() {
             let reason = status.fault_code.map_or(Refusal::Tripped, Refusal::Fault);
@@ -32,13 +33,15 @@ impl<P: Port> Drive3g3ev<P> {
             let cut = withheld(&status).filter(|_| is_run(&status));
             return Err(self.refused(order, cut.unwrap_or(Refusal::State(State::NotReady))));
         }
-        Ok(())
+        // The reference that it finds was given in the old unit, or is told in it.
+        self.check_unit(order)
     }
 
     pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
         self.check_start(direction).await?;
-        // The inputs of n06 to n08 stand in the same word, and are left as they are.
-        if self.command.is_none() {
+        // The inputs of n06 to n08 stand in the same word, and are left as they are: as they are now, where one was on, for they do not
+        // outlive the supply.
+        if self.command.is_none_or(|held| held.intersects(Command::INPUTS)) {
             self.read_command(Class::Command).await?;
         }
         let word = Command::run(direction) | self.inputs();

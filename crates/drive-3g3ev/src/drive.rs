@@ -8,7 +8,7 @@ use drive_core::{
     Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, Withdrawn, Written,
 };
 
-use crate::{CAPABILITIES, Drive3g3ev, broadcast, proof::Proof, settings::Settings};
+use crate::{CAPABILITIES, Drive3g3ev, broadcast, proof::Proof};
 
 /// What loop-backs carry: the data of the manual's sample (§4.1.2).
 const LOOP_BACK: u16 = 0xA537;
@@ -28,7 +28,7 @@ impl<P: Port> Drive for Drive3g3ev<P> {
     }
 
     fn forget(&mut self) {
-        self.settings = Settings::default();
+        self.settings.forget();
         (self.command, self.shown) = (None, None);
         self.watch.lose_sight();
         self.proof = Proof::of_unknown(self.proof.agreed());

@@ -205,10 +205,10 @@ impl<P: Port> Drive3g3ev<P> {
         let count = u16::try_from(grounds.len()).unwrap_or(1);
         let Ok(words) = self.registers.at(Class::Status).read_words(first, count).await else { return };
         for ((register, &ground), word) in (first..).zip(grounds).zip(words) {
-            let changed = self.watch.finds(register, word, ground);
-            if changed && ground == Ground::Units {
-                // It acts at the next power-up (§2.1 note 3).
-                self.settings.unit_was_changed();
+            if register == address::N39 {
+                self.finds_unit(word);
+            } else {
+                self.watch.finds(register, word, ground);
             }
         }
     }

@@ -1,24 +1,27 @@
-//! What the drive is set up for: n05, n39 and n40, read when they are first needed.
+//! What the drive is set up for: n05 and n40, read when they are first needed, and n39, read anew for what moves the motor.
 
 use std::time::Duration;
 
 use drive_core::{
-    Class, Command, Direction, Error, ExceptionMeaning, Exchange, Port, Reaction, Refusal, Result, Watchdog,
-    registers::{Register, Row, access::Readable},
+    Class, Command, Direction, Error, ExceptionMeaning, Exchange, Ground, Port, Reaction, Refusal, Result,
+    Watchdog, registers::Row,
 };
 
 use crate::{
     Drive3g3ev, TIME_OVER,
     frequency::FrequencyUnit,
-    registers::{N05, N39, N40},
+    registers::{N05, N39, N40, REFERENCE},
 };
 
 /// What was read once; `None`: not yet.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Settings {
     n05: Option<u16>,
+    /// n39 as it is in force, as far as is known.
     n39: Option<u16>,
-    /// n39 was changed over the bus: until the drive is switched off, the old unit may still count (§2.1, note 3).
+    /// n39 as it was in force before the line was lost.
+    n39_before: Option<u16>,
+    /// n39 was changed: until the drive is switched off, the old unit may still count (§2.1, note 3).
     unit_changed: bool,
 }
 
@@ -26,27 +29,29 @@ impl Settings {
     /// Forgets what a write to this parameter may have changed.
     pub(crate) fn written(&mut self, row: &Row) {
         self.unit_changed |= row.address == N39.address();
-        *self = Self { unit_changed: self.unit_changed, ..Self::default() };
+        self.n05 = None;
     }
 
-    /// Somebody has changed n39.
-    pub(crate) const fn unit_was_changed(&mut self) {
-        self.unit_changed = true;
+    /// The line was lost: the drive may have been switched off, or be another one.
+    pub(crate) fn forget(&mut self) {
+        *self = Self { n39_before: self.n39.or(self.n39_before), ..Self::default() };
+    }
+
+    /// n39 was read. True where it is found to be another than the one in force.
+    pub(crate) fn finds_unit(&mut self, n39: u16) -> bool {
+        let is_new = !self.unit_changed && self.n39.is_some_and(|known| known != n39);
+        self.unit_changed |= is_new;
+        is_new
     }
 }
 
 impl<P: Port> Drive3g3ev<P> {
     /// What the frequencies that are read count; `None` when it is not certain.
     pub(crate) async fn unit(&mut self, class: Class) -> Result<Option<FrequencyUnit>> {
-        if self.settings.unit_changed {
-            return Ok(None);
+        if !self.settings.unit_changed && self.settings.n39.is_none() {
+            self.learn_unit(class).await?;
         }
-        if self.settings.n39.is_none() {
-            // A drive that does not have it counts nobody knows what.
-            let mut calls = self.registers.at(class);
-            self.settings.n39 = self.absent.word(&mut calls, N39.address()).await?;
-        }
-        Ok(self.settings.n39.and_then(FrequencyUnit::of))
+        Ok(self.known_unit())
     }
 
     /// The same without an exchange; `None` also where it was not read.
@@ -54,16 +59,66 @@ impl<P: Port> Drive3g3ev<P> {
         self.settings.n39.filter(|_| !self.settings.unit_changed).and_then(FrequencyUnit::of)
     }
 
+    /// Reads n39 behind everything else that was read of it: an order that moves the motor rests on it, and a cut between two
+    /// looks at the drive may have put another unit in force.
+    pub(crate) async fn look_at_unit(&mut self) -> Result<()> {
+        if self.settings.unit_changed {
+            return Ok(());
+        }
+        if self.settings.n39.is_none() {
+            return self.learn_unit(Class::Command).await;
+        }
+        let mut calls = self.registers.at(Class::Command);
+        if let Some(n39) = self.absent.word(&mut calls, N39.address()).await? {
+            self.finds_unit(n39);
+        }
+        Ok(())
+    }
+
+    /// n39 was read.
+    pub(crate) fn finds_unit(&mut self, n39: u16) {
+        if self.settings.finds_unit(n39) {
+            self.watch.changes(Ground::Units);
+        }
+    }
+
+    /// n39 as it stands, for the one in force: unless the drive still holds the reference that it was given when another one
+    /// was, for that does not outlive its supply, and what was set since acts at the next power-up.
+    async fn learn_unit(&mut self, class: Class) -> Result<()> {
+        let mut calls = self.registers.at(class);
+        // A drive that does not have it counts nobody knows what.
+        let n39 = self.absent.word(&mut calls, N39.address()).await?;
+        let is_other = n39.zip(self.settings.n39_before).is_some_and(|(now, before)| now != before);
+        let given = self.proof.agreed().filter(|reference| is_other && *reference != 0);
+        if let Some(given) = given
+            && self.registers.at(class).read(REFERENCE).await? == given
+        {
+            self.settings.unit_changed = true;
+            return Ok(());
+        }
+        self.settings.n39 = n39;
+        Ok(())
+    }
+
+    /// Refuses what rests on the unit, where n39 was changed.
+    pub(crate) fn check_unit(&self, command: Command) -> Result<()> {
+        const CHANGED: Refusal = Refusal::Settings(
+            "n39 was changed and acts at the next power-up: switch the drive off and on, then forget() reads it again",
+        );
+        if self.settings.unit_changed { Err(self.refused(command, CHANGED)) } else { Ok(()) }
+    }
+
     /// What the reference counts.
     pub(crate) async fn reference_unit(&mut self, command: Command) -> Result<FrequencyUnit> {
-        if self.settings.unit_changed {
-            let reason = Refusal::Settings(
-                "n39 was changed and acts at the next power-up: switch the drive off and on, then forget() reads it again",
-            );
-            return Err(self.refused(command, reason));
-        }
+        self.look_at_unit().await?;
+        self.check_unit(command)?;
+        let n39 = match self.settings.n39 {
+            Some(n39) => n39,
+            // The drive's own exception says so.
+            None => self.registers.at(Class::Command).read(N39).await?,
+        };
         let exchange = Exchange { function: 0x03, register: Some(N39.address()) };
-        FrequencyUnit::of(self.n39(Class::Command).await?).ok_or(Error::Answer {
+        FrequencyUnit::of(n39).ok_or(Error::Answer {
             slave: self.registers.slave(),
             exchange,
             reason: "n39 holds a unit that the manual does not list",
@@ -123,32 +178,15 @@ impl<P: Port> Drive3g3ev<P> {
     }
 
     async fn n05(&mut self) -> Result<u16> {
-        let known = self.settings.n05;
-        let value = match self.once(Class::Command, N05, known).await {
+        if let Some(value) = self.settings.n05 {
+            return Ok(value);
+        }
+        let value = match self.registers.at(Class::Command).read(N05).await {
             // What this drive does not have forbids nothing.
             Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, .. }) => 0,
             read => read?,
         };
         self.settings.n05 = Some(value);
         Ok(value)
-    }
-
-    async fn n39(&mut self, class: Class) -> Result<u16> {
-        let known = self.settings.n39;
-        let value = self.once(class, N39, known).await?;
-        self.settings.n39 = Some(value);
-        Ok(value)
-    }
-
-    async fn once(
-        &mut self,
-        class: Class,
-        register: Register<impl Readable>,
-        known: Option<u16>,
-    ) -> Result<u16> {
-        match known {
-            Some(value) => Ok(value),
-            None => self.registers.at(class).read(register).await,
-        }
     }
 }

@@ -210,6 +210,70 @@ async fn after_n39_was_changed_nothing_is_guessed_until_the_drive_was_switched_o
     assert_eq!(machine.peek(2), Some(5_000));
 }
 
+/// The supply was away for less than anybody looked, and n39 was changed at the panel before: with 1 a count is 0.01 Hz, with 0
+/// it is 0.1 Hz, from the power-up on (§2.1, note 3).
+#[tokio::test(start_paused = true)]
+async fn a_unit_that_came_into_force_in_a_cut_that_nobody_saw_is_not_written_by_the_old_one() {
+    let (mut drive, machine, _rig) = one();
+    set_up(&machine, &[(0x0127, 1)]);
+    drive.status().await.unwrap();
+    set_up(&machine, &[(0x0127, 0)]);
+    drive.status().await.unwrap();
+    let error = drive.set_setpoint(Frequency::from_hertz(5).into()).await.unwrap_err();
+    assert!(matches!(error, Error::Refused { reason: Refusal::Settings(_), .. }), "{error}");
+    assert_eq!((writes(&machine), machine.peek(2)), (0, Some(0)));
+    // What the words count is not known either, until the drive was seen without supply.
+    assert_eq!(drive.status().await.unwrap().output_frequency, None);
+    drive.forget();
+    drive.set_setpoint(Frequency::from_hertz(5).into()).await.unwrap();
+    assert_eq!(machine.peek(2), Some(50));
+}
+
+/// The setpoint was written before the cut, and its repetition arrived behind it: 500 counts are 50 Hz there.
+#[tokio::test(start_paused = true)]
+async fn a_start_is_refused_where_the_unit_of_its_reference_has_changed() {
+    let (mut drive, machine, _rig) = one();
+    set_up(&machine, &[(0x0127, 1)]);
+    drive.set_setpoint(Frequency::from_hertz(5).into()).await.unwrap();
+    set_up(&machine, &[(0x0127, 0)]);
+    machine.poke(2, 500);
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert!(matches!(error, Error::Refused { reason: Refusal::Settings(_), .. }), "{error}");
+    assert_eq!(commands(&machine), [0; 0]);
+}
+
+/// The line was lost and the drive never without supply: what its panel has set meanwhile acts at the next power-up only.
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_still_holds_what_it_was_given_behind_a_lost_line_counts_as_before() {
+    let (mut drive, machine, _rig) = one();
+    drive.set_setpoint(FIFTY).await.unwrap();
+    machine.poke(0x0127, 1);
+    drive.forget();
+    assert_eq!(drive.status().await.unwrap().output_frequency, None);
+    for _ in 0..2 {
+        let error = drive.set_setpoint(Frequency::from_hertz(5).into()).await.unwrap_err();
+        assert!(matches!(error, Error::Refused { reason: Refusal::Settings(_), .. }), "{error}");
+        drive.forget();
+    }
+    assert_eq!(machine.peek(2), Some(500));
+    machine.power_cycle();
+    drive.forget();
+    drive.set_setpoint(Frequency::from_hertz(5).into()).await.unwrap();
+    assert_eq!(machine.peek(2), Some(500), "of 0.01 Hz");
+}
+
+/// What a second master has set in 0001h does not outlive the supply, and a start does not set it again.
+#[tokio::test(start_paused = true)]
+async fn inputs_that_a_power_cut_has_ended_are_not_set_again_by_a_start() {
+    let (mut drive, machine, _rig) = one();
+    machine.written_by_another(1, 0x10).unwrap();
+    drive.status().await.unwrap();
+    machine.power_cycle();
+    drive.status().await.unwrap();
+    drive.start(Direction::Forward).await.unwrap();
+    assert_eq!(machine.peek(1), Some(1));
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_fault_is_reset_by_one_pulse_of_the_input_that_carries_it_and_nothing_starts() {
     let (mut drive, machine, _rig) = running().await;

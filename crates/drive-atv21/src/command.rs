@@ -88,7 +88,7 @@ impl<P: Port> Atv21<P> {
     /// the run command. Where FA00 has to take command first, only that shows who decides then.
     pub(crate) async fn judge_start(&mut self, direction: Direction) -> Result<(CommandWord, CommandWord)> {
         let command = Command::Start(direction);
-        self.check_own(command).await?;
+        self.check_itself(command).await?;
         let (status, held) = self.check_start(command).await?;
         let word = self.run_word(direction, held);
         if !Self::takes(held, word)

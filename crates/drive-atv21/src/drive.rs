@@ -30,7 +30,7 @@ impl<P: Port> Drive for Atv21<P> {
         self.proof.forget();
         self.watch.lose_sight();
         (self.held, self.shown, self.references) = (None, None, None);
-        (self.upper_limit, self.modes, self.kind) = (None, None, None);
+        (self.upper_limit, self.modes, self.kind, self.named) = (None, None, None, None);
         self.absent = Absent::default();
     }
 

@@ -41,8 +41,8 @@ mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Absent, Capabilities, Command, Error, ExceptionMeaning, Frequency, Port, Quantity, Reaction, Recognised,
-    Refusal, Registers, Result, SlaveAddress, Status, StopMode, Watch, WatchdogCapability,
+    Absent, Capabilities, Command, Error, ExceptionMeaning, Frequency, Identity, Port, Quantity, Reaction,
+    Recognised, Refusal, Registers, Result, SlaveAddress, Status, StopMode, Watch, WatchdogCapability,
     serial::CharacterFormat,
 };
 
@@ -152,6 +152,8 @@ pub struct Atv21<P> {
     modes: Option<[Option<u16>; 2]>,
     /// Whether it has said that it is an Altivar 21; `None`: it was not asked.
     kind: Option<Recognised>,
+    /// What it has said of itself by 43/14.
+    named: Option<Identity>,
     authority: Authority,
     /// What its owner has chosen; `None`: what the drive holds is kept.
     selections: Option<CommandWord>,
@@ -181,6 +183,7 @@ impl<P: Port> Atv21<P> {
             absent: Absent::default(),
             modes: None,
             kind: None,
+            named: None,
             authority: Authority::default(),
             selections: None,
             held: None,
@@ -240,6 +243,16 @@ impl<P: Port> Atv21<P> {
             Some(Recognised::NotMine { it_is }) => Err(self.refused(command, Refusal::AnotherDrive(it_is))),
             _ => Ok(()),
         }
+    }
+
+    /// Refuses a start of a drive that says that it is another one, or another than before: it is asked before each.
+    async fn check_itself(&mut self, command: Command) -> Result<()> {
+        let was_asked = self.named.is_some();
+        self.check_own(command).await?;
+        if was_asked && let Some(reason) = self.ask_name().await?.refuses_start(&mut self.named) {
+            return Err(self.refused(command, reason));
+        }
+        Ok(())
     }
 
     const fn refused(&self, command: Command, reason: Refusal) -> Error {

@@ -241,6 +241,10 @@ impl<P: Port> Atv21<P> {
     /// What 43/14 says, and FB05 and FB72 where the drive has them.
     pub(crate) async fn read_identity(&mut self) -> Result<Identity> {
         let told = self.registers.at(Class::Background).identification(ReadCode::Basic).await;
+        self.named = match &told {
+            Err(Error::Exception { .. }) => Some(Identity::default()),
+            told => told.as_ref().ok().cloned(),
+        };
         let codes = self.model_words(Class::Background).await?;
         let identity = match told {
             Ok(identity) => Identity { codes, ..identity },
@@ -254,15 +258,21 @@ impl<P: Port> Atv21<P> {
 
     /// Asks the drive what it is, by 43/14, and by FB05 and FB72 where that names no reference.
     pub(crate) async fn recognise_itself(&mut self) -> Result<()> {
-        let mut identity = match self.registers.at(Class::Command).identification(ReadCode::Basic).await {
-            Err(Error::Exception { .. }) => Identity::default(),
-            told => told?,
-        };
+        let mut identity = self.ask_name().await?;
+        self.named = Some(identity.clone());
         if identity.model.is_none() {
             identity.codes = self.model_words(Class::Command).await?;
         }
         self.kind = Some(model::recognise(&identity));
         Ok(())
+    }
+
+    /// What it says of itself by 43/14, and nothing where it refuses that.
+    pub(crate) async fn ask_name(&mut self) -> Result<Identity> {
+        match self.registers.at(Class::Command).identification(ReadCode::Basic).await {
+            Err(Error::Exception { .. }) => Ok(Identity::default()),
+            told => told,
+        }
     }
 
     async fn model_words(&mut self, class: Class) -> Result<Vec<RawWord>> {

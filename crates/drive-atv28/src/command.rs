@@ -122,6 +122,10 @@ impl<P: Port> Drivecom for Atv28<P> {
         if words.is_driving() && words.chart() == Some(ChartState::QuickStopActive) {
             return Ok(Some(Refusal::State(State::QuickStop)));
         }
+        let identity = self.read_identity(Class::Command).await?;
+        if let Some(reason) = identity.refuses_start(&mut self.said) {
+            return Ok(Some(reason));
+        }
         let mut calls = self.registers.at(Class::Command);
         let frequency = calls.read(LFR).await?;
         let speed = self.absent.word(&mut calls, LFRD.address()).await?.unwrap_or(0);

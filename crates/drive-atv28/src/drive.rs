@@ -13,7 +13,7 @@ use drive_drivecom as drivecom;
 use crate::{
     Atv28, FAULTS, WARNINGS, command,
     reading::{FIRST_BLOCK, FastWords, SECOND_BLOCK, read_block},
-    registers::{DP1, DP2, DP3, DP4, ETA, FRH, INV, IOLR, LFT, OPR, OTR, RFRD, RTH, THD, THR, ULN},
+    registers::{DP1, DP2, DP3, DP4, ETA, FRH, IOLR, LFT, OPR, OTR, RFRD, RTH, THD, THR, ULN},
     words::{self, ControlWord, ExtendedStatus},
 };
 
@@ -32,7 +32,7 @@ impl<P: Port> Drive for Atv28<P> {
 
     fn forget(&mut self) {
         self.proof.forget();
-        (self.absent, self.speeds, self.control) = (Absent::default(), None, None);
+        (self.absent, self.speeds, self.control, self.said) = (Absent::default(), None, None, None);
     }
 
     /// Two exchanges, and a third one, for `CMD`, where the words alone do not tell whether a run command is in force: the
@@ -127,10 +127,9 @@ impl<P: Port> Drive for Atv28<P> {
 
     /// The drive does not say what it is; its nominal current tells one rating from another.
     async fn identify(&mut self) -> Result<Identity> {
-        let inv = self.absent.word(&mut self.registers.at(Class::Background), INV.address()).await?;
-        let inv = inv.map(|value| RawWord { address: INV.address(), code: INV.row().code, value });
-        let codes = inv.into_iter().collect();
-        Ok(Identity { codes, ..Identity::default() })
+        let identity = self.read_identity(Class::Background).await?;
+        self.said = Some(identity.clone());
+        Ok(identity)
     }
 
     async fn keep_alive(&mut self) -> Result<()> {

@@ -15,8 +15,8 @@ mod setpoint;
 pub mod words;
 
 use drive_core::{
-    Absent, Capabilities, Control, ExceptionMeaning, Port, Quantity, Registers, Row, SerialSettings,
-    SlaveAddress, Speed, StatusBit, StopMode, serial::CharacterFormat,
+    Absent, Capabilities, Control, ExceptionMeaning, Identity, Port, Quantity, Registers, Row,
+    SerialSettings, SlaveAddress, Speed, StatusBit, StopMode, serial::CharacterFormat,
 };
 use drive_drivecom::Proof;
 
@@ -77,6 +77,8 @@ pub struct Atv28<P> {
     speeds: Option<(Speed, Speed)>,
     /// Who commanded when it was last read.
     control: Option<Control>,
+    /// What it has said of itself.
+    said: Option<Identity>,
 }
 
 impl<P: Port> Atv28<P> {
@@ -93,6 +95,7 @@ impl<P: Port> Atv28<P> {
             proof: Proof::default(),
             absent: Absent::default(),
             speeds: None,
+            said: None,
             control: None,
         }
     }

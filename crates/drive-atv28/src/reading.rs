@@ -1,10 +1,13 @@
 //! The words of the fast set, and what they say.
 
-use drive_core::{Absent, Calls, Current, Frequency, Port, RawWord, Result, Status, registers::Register};
+use drive_core::{
+    Absent, Calls, Class, Current, Frequency, Identity, Port, RawWord, Result, Status, registers::Register,
+};
 use drive_drivecom::StatusWords;
 
 use crate::{
-    registers::{CMD, ETA, ETI, ETI2, FRH, LCR, LFT, RFR, THD, THR, ULN, W452},
+    Atv28,
+    registers::{CMD, ETA, ETI, ETI2, FRH, INV, LCR, LFT, RFR, THD, THR, ULN, W452},
     words::ControlWord,
 };
 
@@ -105,6 +108,15 @@ pub(crate) async fn read_block<P: Port>(
         calls.read_word(needed).await?;
     }
     Ok(words)
+}
+
+impl<P: Port> Atv28<P> {
+    /// All that the drive says of itself: its nominal current.
+    pub(crate) async fn read_identity(&mut self, class: Class) -> Result<Identity> {
+        let inv = self.absent.word(&mut self.registers.at(class), INV.address()).await?;
+        let inv = inv.map(|value| RawWord { address: INV.address(), code: INV.row().code, value });
+        Ok(Identity { codes: inv.into_iter().collect(), ..Identity::default() })
+    }
 }
 
 /// The raw form of the control word, for statuses that were confirmed by it.

@@ -213,8 +213,7 @@ impl<P: Port> Drivecom for Atv312<P> {
         setpoint: Option<Setpoint>,
         status: &Status,
     ) -> Result<Option<Refusal>> {
-        self.recognise_itself().await?;
-        if let Some(reason) = self.refuses_writes() {
+        if let Some(reason) = self.recognise_itself().await? {
             return Ok(Some(reason));
         }
         self.read_settings(Class::Command).await?;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use drive_core::{
     Class, Error, Fault, Faults, Frequency, Identity, Measurements, Percent, Port, RawWord, Recognised,
-    Result, Row, Setpoint, Speed, Voltage,
+    Refusal, Result, Row, Setpoint, Speed, Voltage,
 };
 use drive_drivecom::StatusWords;
 use tokio_modbus::prelude::ReadCode;
@@ -110,6 +110,7 @@ impl<P: Port> Atv312<P> {
     /// called itself another. A drive that refuses the function is described by the words alone.
     pub(crate) async fn read_identity(&mut self) -> Result<Identity> {
         let mut identity = self.named(Class::Background).await?;
+        self.known.named = Some(identity.clone());
         if !matches!(recognised(&identity), Recognised::NotMine { .. }) {
             let codes = &mut identity.codes;
             self.collect(codes, &[ARE.row(), NCV.row(), VCAL.row()]).await?;
@@ -140,13 +141,14 @@ impl<P: Port> Atv312<P> {
         Ok(())
     }
 
-    /// Asks the drive what it is, once, where nobody has.
-    pub(crate) async fn recognise_itself(&mut self) -> Result<()> {
+    /// Asks the drive what it is, before each start: another one may have come to its address since it was asked last. Why it is not
+    /// started, if that shows.
+    pub(crate) async fn recognise_itself(&mut self) -> Result<Option<Refusal>> {
+        let named = self.named(Class::Command).await?;
         if self.known.kind.is_none() {
-            let identity = self.named(Class::Command).await?;
-            self.known.kind = Some(recognised(&identity));
+            self.known.kind = Some(recognised(&named));
         }
-        Ok(())
+        Ok(named.refuses_start(&mut self.known.named).or(self.refuses_writes()))
     }
 }
 

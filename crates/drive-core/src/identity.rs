@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::status::RawWord;
+use crate::{refusal::Refusal, status::RawWord};
 
 /// What a drive says it is. Two drives that differ in any part are different drives.
 ///
@@ -33,6 +33,16 @@ pub struct Identity {
     pub version: Option<String>,
     /// Words that tell one model from another, where the family has registers for it.
     pub codes: Vec<RawWord>,
+}
+
+impl Identity {
+    /// Why no start is given to a drive that says this now, where it said something else `before`: it was exchanged between two looks.
+    /// What it says the first time is kept there.
+    pub fn refuses_start(self, before: &mut Option<Self>) -> Option<Refusal> {
+        let is_other = before.as_ref().is_some_and(|before| *before != self);
+        before.get_or_insert(self);
+        is_other.then_some(Refusal::Exchanged)
+    }
 }
 
 /// Every part that it says, one after the other.

@@ -61,6 +61,9 @@ pub enum Refusal {
     /// The drive has said that it is another one than its family's, in these words: it is read, and stopped when that is asked
     /// for, and nothing else is written.
     AnotherDrive(&'static str),
+    /// The drive says of itself another thing than it did before: it was exchanged, and nobody has missed it. A start waits until it
+    /// was [identified](crate::Drive::identify) again.
+    Exchanged,
     /// Of a setpoint: nothing speaks against it, and nothing shows that the drive goes by it before the motor runs; the text says what
     /// there is to see. A start may follow it, and shows it.
     OnlyAStartShows(&'static str),
@@ -81,7 +84,7 @@ impl Refusal {
             Self::NothingToSave => "nothing_to_save",
             Self::EepromLife => "eeprom_life",
             Self::MotorRunning => "motor_running",
-            Self::AnotherDrive(_) => "another_drive",
+            Self::AnotherDrive(_) | Self::Exchanged => "another_drive",
             Self::OnlyAStartShows(_) => "only_a_start_shows",
         }
     }
@@ -140,6 +143,9 @@ impl fmt::Display for Refusal {
             ),
             Self::MotorRunning => f.write_str("the motor runs: stop it first"),
             Self::AnotherDrive(it_is) => write!(f, "the drive says that it is {it_is}; change the family that is set for it"),
+            Self::Exchanged => f.write_str(
+                "the drive is another one than before, by what it says of itself: see which one stands there, and accept it if it is meant",
+            ),
         }
     }
 }
@@ -173,6 +179,7 @@ mod tests {
             Refusal::NothingToSave,
             Refusal::EepromLife,
             Refusal::MotorRunning,
+            Refusal::Exchanged,
         ];
         let controlled = control.map(Refusal::NotInControl);
         for refusal in others.into_iter().chain(controlled).chain(states.map(Refusal::State)) {

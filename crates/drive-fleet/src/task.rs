@@ -83,6 +83,12 @@ impl Task {
                 desk.supervisor.handle_heard(at);
             }
             let step = desk.supervisor.next(Instant::now());
+            if let Step::Do { job: Job::Start(direction), .. } = step
+                && let Some(word) = drive.run_word_for(direction)
+            {
+                // It may turn the motor long before its driver has seen that it does: it is ours from now on.
+                desk.supervisor.handle_lease(Some(Lease::new(direction, word)));
+            }
             desk.publish();
             let (call, until) = match step {
                 Step::Finished => break,

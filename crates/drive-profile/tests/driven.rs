@@ -335,6 +335,24 @@ async fn a_drive_that_answers_otherwise_than_its_guards_gets_no_word_not_even_a_
     rig.drive.stop(StopMode::Ramp).await.expect("its guards hold");
 }
 
+/// Between two looks at it it was exchanged, or set up otherwise at its panel.
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_answers_otherwise_than_its_guards_by_now_is_not_started() {
+    let mut rig = rig("goodrive");
+    rig.drive.status().await.expect("it answers");
+    give(&mut rig, 20).await;
+    let identity = rig.machine.peek(0x2103).expect("it has one");
+    assert!(rig.machine.poke(0x2103, 0));
+    rig.drive.status().await.expect("it is read all the same");
+    let writes = |rig: &Rig| rig.machine.requests(0x06);
+    let before = writes(&rig);
+    let refused = rig.drive.start(Direction::Forward).await.expect_err("it is another drive");
+    assert!(refused.to_string().contains("IDENTITY"), "{refused}");
+    assert_eq!(writes(&rig), before);
+    assert!(rig.machine.poke(0x2103, identity));
+    rig.drive.start(Direction::Forward).await.expect("it is the one of its file");
+}
+
 /// In the I/O profile of an Altivar word 7 starts it: until its guard was read, a stop is word 0, which coasts.
 #[tokio::test(start_paused = true)]
 async fn a_stop_before_the_guards_were_read_is_the_one_that_is_a_stop_whatever_they_say() {

@@ -1,7 +1,7 @@
 //! The line has lost its port. However short that was, another drive may answer now: the adapters have come back under each
 //! other's name, the serial servers under each other's address.
 
-use drive_core::StopMode;
+use drive_core::{Error, Refusal, StopMode};
 use tokio::time::Instant;
 
 use super::{
@@ -18,19 +18,32 @@ impl Supervisor {
     /// Its line has lost its port. Until the drive was asked anew which it is nothing is sent to it but stops. Gives whether the
     /// job in flight has to be dropped for it.
     pub(crate) fn handle_line_lost(&mut self, now: Instant) -> bool {
+        self.look_anew(now);
+        self.end_writes();
+        self.end_order_by_line(now);
+        self.end_restoring("its line was lost meanwhile");
+        // What would be sent of it yet was meant for the drive that answered before, and what it has read is that one's. A stop is
+        // given all the same, as that of a drive which is lost.
+        self.in_flight.is_some_and(|job| !matches!(job, Job::Stop(_)))
+    }
+
+    /// Another drive may answer than before: what is known of it is read anew, and it is asked which it is.
+    fn look_anew(&mut self, now: Instant) {
         self.changed = true;
         self.unseen = true;
         self.given = None;
         self.checks.connected(now);
-        self.end_writes();
-        self.end_order_by_line(now);
-        self.end_restoring("its line was lost meanwhile");
         if self.link == Link::Connected {
             self.pace.hurry(now);
         }
-        // What would be sent of it yet was meant for the drive that answered before, and what it has read is that one's. A stop is
-        // given all the same, as that of a drive which is lost.
-        self.in_flight.is_some_and(|job| !matches!(job, Job::Stop(_)))
+    }
+
+    /// An order was not carried out, and its family may have found that another drive answers than before: nobody has missed it.
+    pub(super) fn note_exchange(&mut self, now: Instant, error: &Error) {
+        if matches!(error, Error::Refused { reason: Refusal::Exchanged, .. }) {
+            self.look_anew(now);
+            self.end_writes();
+        }
     }
 
     /// Whether the drive that answers was not looked at yet since its line was lost.

@@ -308,6 +308,9 @@ impl Supervisor {
         if let Some(job) = self.withdraw_job(now).or_else(|| self.restore_job()) {
             return Some((job, None));
         }
+        if let Some(job) = self.stopped_identity_job(now) {
+            return Some((job, None));
+        }
         let feed_at = self.checks.feed_at().filter(|_| self.link == Link::Connected);
         let hungry = feed_at.is_some_and(|at| at <= now);
         let anew = self.doubtful || self.unseen || self.link != Link::Connected;
@@ -453,6 +456,8 @@ impl Supervisor {
                 }
                 if self.link == Link::Connected {
                     self.adopt_run(now);
+                    // The status that it showed before it was asked.
+                    self.judge_stop(now);
                 }
             }
             Reply::Watchdog(result) if matches!(job, Some(Job::RestoreWatchdog(_))) => {

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use drive_core::{
-    Command, Error, ErrorKind, Frequency, INJECTION_AT_MOST, Motion, Result, Setpoint, StopMode, Stopped,
+    Command, Error, ErrorKind, Frequency, INJECTION_AT_MOST, Motion, Refusal, Result, Setpoint, StopMode,
+    Stopped,
 };
 use tokio::time::Instant;
 
@@ -56,6 +57,8 @@ pub(super) struct Stopping {
     begun: u32,
     /// Whose act it is, the last.
     asker: Asker,
+    /// Somebody has asked for it who knew that another drive stands there: it is that one which is to stop.
+    of_another: bool,
     /// The drive has shown that no run command is in force.
     taken: bool,
     /// Since when the drive injects for it.
@@ -194,8 +197,10 @@ impl Supervisor {
         // The exit has its own limit; until then the stop is repeated.
         let until = if asker.is_exit() { now + EXIT } else { now + patience };
         let mut waiter = Waiter { asker: asker.clone(), asked: order, asked_at: now, until, is_told: false };
+        let of_another = self.checks.is_another() && asker.id().is_some();
         match &mut self.stopping {
             Some(stopping) => {
+                stopping.of_another |= of_another;
                 if crate::mutant!("stop-softened", strength(mode) > strength(stopping.asked), true) {
                     (stopping.asked, stopping.mode, stopping.used) = (mode, mode, mode);
                     stopping.taken = false;
@@ -227,6 +232,7 @@ impl Supervisor {
                     attempts: 0,
                     begun: 0,
                     asker,
+                    of_another,
                     taken: false,
                     injects_since: None,
                     lowest: None,
@@ -318,6 +324,7 @@ impl Supervisor {
         let Some(status) = &self.status else { return };
         let (at, motion, output) = (status.at, status.value.motion, status.value.output_frequency);
         let standstill = self.settings.times.standstill;
+        let (is_known, is_another) = (self.checks.stranger().is_none(), self.checks.is_another());
         let Some(stopping) = &mut self.stopping else { return };
         if stopping.attempts == 0 {
             return;
@@ -340,6 +347,10 @@ impl Supervisor {
                 if motion == Motion::Braking {
                     stopping.comes_down(now, output, standstill);
                 }
+                // Another drive that stands there says nothing of the motor that was to be stopped.
+                if !(is_known || is_another && stopping.of_another) {
+                    return;
+                }
                 self.tell_taken(at);
                 // Without an output no more is to be had: the shaft may coast.
                 let ends = matches!(motion, Motion::Held | Motion::AtRest | Motion::Coasting);
@@ -348,6 +359,12 @@ impl Supervisor {
                 }
             }
         }
+    }
+
+    /// The question which drive has taken the stop, where only that is wanted for its confirmation.
+    pub(super) fn stopped_identity_job(&self, now: Instant) -> Option<Job> {
+        let waits = self.stopping.as_ref().is_some_and(|stopping| stopping.taken);
+        self.checks.identity_job(now).filter(|_| waits && self.link == Link::Connected && !self.unseen)
     }
 
     /// A status that was read then shows that no run command is in force.
@@ -433,7 +450,7 @@ impl Supervisor {
                 let last = Some(status.seen(now));
                 let because = match &error {
                     Some(Error::NotConfirmed { because, .. }) => *because,
-                    _ => None,
+                    _ => self.checks.is_another().then_some(Refusal::Exchanged),
                 };
                 Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because, stop })
             }

@@ -40,6 +40,7 @@ impl Supervisor {
                         self.setpoint_given(now, setpoint);
                     }
                     ErrorKind::Refused | ErrorKind::Unsupported | ErrorKind::Exception => {
+                        self.note_exchange(now, &error);
                         self.end_order(Outcome::Refused(error.into()));
                     }
                     // The word that the drive holds is not what it follows: the family has looked.
@@ -105,6 +106,7 @@ impl Supervisor {
                 }
             }
             Err(error) if matches!(error.kind(), ErrorKind::Refused | ErrorKind::Unsupported) => {
+                self.note_exchange(now, &error);
                 self.end_order(Outcome::Refused(error.into()));
             }
             // The family has looked for as long as it takes: nobody here knows better.

@@ -54,6 +54,8 @@ impl<P: Port> ProfileDrive<P> {
             return Err(NO_SUCH_START);
         }
         let (status, words) = self.read_status(Class::Command).await?;
+        // Between two looks it may have been exchanged, or set up otherwise.
+        self.guarded.forget(&self.profile);
         self.guard(order).await?;
         let local = self.commanded_by_other(&words);
         let was_fed = matches!(status.state, State::Running | State::Stopping);

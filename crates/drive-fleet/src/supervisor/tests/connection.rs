@@ -537,3 +537,87 @@ fn a_run_command_of_another_drive_behind_a_lost_line_is_not_withdrawn() {
     rig.pass(5_000 * MS);
     assert_eq!(rig.drive.writes(), []);
 }
+
+/// Nobody has missed the drive: its family finds at the start that it says another thing of itself than before.
+#[test]
+fn a_drive_that_was_exchanged_between_two_polls_is_told_and_not_started_until_it_is_accepted() {
+    let mut rig = Rig::ready();
+    rig.drive.identity.model = Some("two".to_owned());
+    rig.drive.withholds_starts = Some(Refusal::Exchanged);
+    let refused = rig.order(START);
+    rig.pass(500 * MS);
+    assert!(matches!(rig.outcome(refused), Some(Outcome::Refused(_))), "{:?}", rig.outcome(refused));
+    assert!(rig.events().contains(&"identity changed"), "{:?}", rig.events());
+    let anew = [Job::Start(Direction::Forward), Job::Status { anew: true }, Job::Identify];
+    assert_eq!(rig.drive.log[..3], anew);
+    // Asked again which it is, its family has nothing against it; the fleet has.
+    rig.drive.withholds_starts = None;
+    let refused = rig.order(run_at(20));
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(refused), Some(&Outcome::Refused(Refused::IdentityChanged)));
+    rig.order(Order::AcceptIdentity);
+    let started = rig.order(START);
+    rig.pass(500 * MS);
+    assert!(rig.outcome(started).is_some_and(Outcome::is_confirmed), "{:?}", rig.outcome(started));
+}
+
+/// A drive of which the line was lost while it ran, and a stop that waits for it.
+fn unheard_and_stopped() -> (Rig, CallId) {
+    let mut rig = Rig::ready();
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    rig.drive.failing = Some(PortError::Timeout { after: 20 * MS });
+    let stop = rig.stop(StopMode::Ramp);
+    rig.pass(1_000 * MS);
+    rig.drive.log.clear();
+    (rig, stop)
+}
+
+#[test]
+fn a_stop_is_not_confirmed_by_another_drive_at_rest_than_the_one_that_was_to_be_stopped() {
+    let (mut rig, stop) = unheard_and_stopped();
+    let identity = Identity { model: Some("two".to_owned()), ..Identity::default() };
+    rig.drive = Paper { identity, ..Paper::new() };
+    let told =
+        |rig: &Rig| rig.outputs.iter().any(|output| matches!(output, Output::InForce(id, _) if *id == stop));
+    rig.pass(150_000 * MS);
+    assert!(!told(&rig), "nor that it has taken it");
+    let Some(Outcome::NotConfirmed(Unconfirmed::TimeOver { because, .. })) = rig.outcome(stop) else {
+        panic!("{:?}", rig.outcome(stop))
+    };
+    assert_eq!(*because, Some(Refusal::Exchanged));
+    let events = rig.events();
+    assert!(events.contains(&"stop unconfirmed") && !events.contains(&"stop confirmed"), "{events:?}");
+    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)], "it was given, and is not repeated");
+    // Whoever accepts it says that it is the one that is meant; so does whoever stops what stands there by now.
+    let mut again = exchanged_amid_a_stop();
+    let other = again.stop(StopMode::Ramp);
+    again.pass(2_000 * MS);
+    assert!(again.outcome(other).is_some_and(Outcome::is_confirmed), "{:?}", again.outcome(other));
+    rig.order(Order::AcceptIdentity);
+    rig.pass(2_000 * MS);
+    assert!(rig.events().contains(&"stop confirmed"));
+}
+
+fn exchanged_amid_a_stop() -> Rig {
+    let (mut rig, _) = unheard_and_stopped();
+    let identity = Identity { model: Some("two".to_owned()), ..Identity::default() };
+    rig.drive = Paper { identity, ..Paper::new() };
+    rig.pass(5_000 * MS);
+    assert!(rig.snapshot().stop.is_some(), "{:?}", rig.events());
+    rig
+}
+
+#[test]
+fn a_stop_behind_a_loss_is_confirmed_as_soon_as_the_drive_has_said_that_it_is_the_same() {
+    let (mut rig, stop) = unheard_and_stopped();
+    rig.others_have_the_turn = true;
+    rig.drive.failing = None;
+    while rig.outcome(stop).is_none() {
+        rig.pass(MS);
+    }
+    assert!(rig.outcome(stop).is_some_and(Outcome::is_confirmed), "{:?}", rig.outcome(stop));
+    let behind = rig.drive.log.iter().skip_while(|job| matches!(job, Job::Status { .. }));
+    let behind: Vec<Job> = behind.copied().collect();
+    assert_eq!(behind, [Job::Stop(StopMode::Ramp), Job::Identify], "the stop waits for nothing");
+}

@@ -68,6 +68,8 @@ struct Paper {
     withholds_stops: Option<Refusal>,
     /// It takes every stop and goes on, because.
     denies_stops: Option<Refusal>,
+    /// It refuses a start, because.
+    withholds_starts: Option<Refusal>,
     /// A setpoint is not confirmed, for this reason.
     denies_setpoints: Option<Refusal>,
     /// The run command of this side that it holds.
@@ -125,6 +127,7 @@ impl Paper {
             expires_stops: false,
             withholds_stops: None,
             denies_stops: None,
+            withholds_starts: None,
             denies_setpoints: None,
             lease: None,
             held: None,
@@ -243,8 +246,8 @@ impl Paper {
                 Reply::SelfRestarts(self.result(restarts))
             }
             Job::Start(direction) => {
-                if self.status.is_fault() {
-                    let reason = Refusal::Tripped;
+                let tripped = self.status.is_fault().then_some(Refusal::Tripped);
+                if let Some(reason) = self.withholds_starts.or(tripped) {
                     let command = Command::Start(direction);
                     return Reply::Ordered(Err(Error::Refused { slave: slave(), command, reason }));
                 }

@@ -39,6 +39,7 @@ export const SENTENCES_FR = {
   'nothing has changed since the last save: change a parameter first': 'rien n’a changé depuis la dernière sauvegarde : modifier d’abord un paramètre',
   'the saves that were counted have used up the EEPROM\'s life: replace the drive, or correct the count': 'les sauvegardes comptées ont épuisé la durée de vie de l’EEPROM : remplacer le variateur, ou corriger le compte',
   'the motor runs: stop it first': 'le moteur tourne : l’arrêter d’abord',
+  'the drive is another one than before, by what it says of itself: see which one stands there, and accept it if it is meant': 'le variateur n’est plus celui d’avant, d’après ce qu’il dit de lui-même : voir lequel est là, et l’accepter si c’est bien lui',
   'the limits are in hertz, give the setpoint in hertz': 'les limites sont en hertz : donner la consigne en hertz',
   'the drive has limits: give the setpoint with the start': 'le variateur a des limites : donner la consigne avec le démarrage',
 
