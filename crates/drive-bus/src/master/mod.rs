@@ -110,6 +110,8 @@ pub struct Master<C> {
     stats: Stats,
     record: Record,
     evidence: Evidence,
+    /// How many values were withdrawn.
+    retractions: u64,
 }
 
 /// What is asked, and by whom.
@@ -246,6 +248,7 @@ impl<C> Master<C> {
             stats: Stats::default(),
             record: Record::default(),
             evidence: Evidence::default(),
+            retractions: 0,
             config,
         };
         master.set_far_end_paces(master.config.endpoint.is_serial());
@@ -640,12 +643,18 @@ impl<C> Master<C> {
             let station = self.station(slave);
             station.stats.retracted += 1;
             station.retracted = Some(asked_at);
+            self.retractions += 1;
         }
     }
 
     /// When the last value of a slave was asked for that another answer has withdrawn.
     pub(crate) fn retracted(&self, slave: u8) -> Option<Instant> {
         self.stations.get(&slave)?.retracted
+    }
+
+    /// How many values were withdrawn so far, of all slaves.
+    pub(crate) const fn retractions(&self) -> u64 {
+        self.retractions
     }
 
     /// When the last question began that a slave has answered.
