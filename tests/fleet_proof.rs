@@ -87,8 +87,7 @@ fn told(family: Family, drives: u8) -> LinePlan {
 
 /// How many exchanges a status takes, and how long one of every drive takes of the line.
 async fn measured(plant: &Plant, runs: bool) -> (f64, Duration) {
-    // Each of what takes turns was looked at once: the first time it is asked twice where it says what another says.
-    sleep(EVERY * 150).await;
+    sleep(EVERY * 30).await;
     let drives = plant.fleet.drives();
     let count = || {
         let polls: u64 = drives.iter().map(|drive| drive.snapshot().counters.polls).sum();

@@ -254,12 +254,7 @@ impl Plant {
         motor.ready(PATIENCE).await.expect("it gets ready");
         let outcome = motor.run(drive_core::Direction::Forward, Frequency::from_hertz(hertz)).await;
         assert!(outcome.is_confirmed(), "{outcome}");
-        // Nearer than 0.5 Hz it is at its reference, and there within a moment of its ramp.
-        let away = || self.machine().observe().output_frequency.abs_diff(i32::from(hertz) * 100);
-        assert!(away() <= 50, "{} of 0.01 Hz", away());
-        while away() != 0 {
-            tokio::time::sleep(Duration::from_millis(1)).await;
-        }
+        assert_eq!(self.machine().observe().output_frequency, i32::from(hertz) * 100);
     }
 
     /// Requests of this machine that wrote something.

@@ -209,7 +209,7 @@ fn what_comes_once_more_though_it_was_owed_withdraws_what_was_taken_instead() {
 }
 
 /// Reads of five registers of one word in a row, of a far end that says one answer in ten once more after 4, 10 or 30 ms. Gives how
-/// many were told wrong.
+/// many were told wrong behind the first row, in which nothing is known of them.
 async fn wrong_beside_doubles(seed: u64) -> u32 {
     let (ours, far) = tokio::io::duplex(4_096);
     let line = Line::over(ours, LineConfig { far_end_paces: Some(false), ..LineConfig::stream(SERIAL) });
@@ -239,10 +239,10 @@ async fn wrong_beside_doubles(seed: u64) -> u32 {
     });
     let mut slave = line.slave(1).with_terms(Terms::of(Class::Status));
     let mut wrong = 0;
-    for _ in 0..200 {
+    for row in 0..200 {
         for register in 1..=5 {
             if let Ok(words) = read(&mut slave, register, 1).await {
-                wrong += u32::from(words[0] != register);
+                wrong += u32::from(row > 0 && words[0] != register);
             }
         }
         sleep(400 * MS).await;

@@ -146,16 +146,11 @@ async fn nor_where_what_it_says_changes_in_that_very_row() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn nor_in_the_first_row_of_all() {
-    for place in 0..RUNS.len() {
-        for words in [RUNS, STANDS] {
-            let (_line, mut slave, far_end) = line(&words);
-            far_end.lock().unwrap().doubles = Some(place);
-            for _ in 0..2 {
-                assert_eq!(wrong_in_a_row(&mut slave, &words).await, [], "{place}");
-            }
-        }
-    }
+async fn what_is_read_for_the_first_time_is_asked_once_though_all_of_it_says_the_same() {
+    let words: Vec<(u16, u16)> = (1..=100).map(|register| (register, 0)).collect();
+    let (_line, mut slave, far_end) = line(&words);
+    assert_eq!(wrong_in_a_row(&mut slave, &words).await, []);
+    assert_eq!(far_end.lock().unwrap().asked, words.len());
 }
 
 #[tokio::test(start_paused = true)]

@@ -4,7 +4,8 @@
 //! behind it, and so on. The first that is wrong says, word for word, what another question was answered just before. So
 //! what a read says is told at once where it said so before, or where no other has said it lately; else it is asked once
 //! more before anybody is told. Behind one that says what it said before, and what another has said too, whether the row is
-//! in step is not known: what is new there is asked once more as well.
+//! in step is not known: what is new there is asked once more as well. What is asked for the first time is told at once: a
+//! parameter is read once, and most of them say 0.
 
 use tokio::time::Instant;
 
@@ -71,7 +72,9 @@ impl Row {
         if before.is_some() && !come.contradicts_itself() {
             return false;
         }
-        if self.said.iter().any(|said| said.question == question && said.frame == frame) {
+        // What was never asked before has nothing that it could have changed from.
+        let own = self.said.iter().find(|said| said.question == question && said.frame.shape == frame.shape);
+        if own.is_none_or(|own| own.frame == frame) {
             return false;
         }
         let is_uncertain = before.is_none()
