@@ -57,6 +57,7 @@ pub const ALL: &[Mutant] = &[
     mutant("two-answers-believed", "of two answers that differ none is believed"),
     mutant("late-answer-unfeared", "a late answer is not that to the next request"),
     mutant("doubtful-answer-believed", "an answer that may be that to an earlier request proves nothing"),
+    mutant("row-out-of-step-believed", "an answer that comes twice is not that to the next read"),
     mutant("silence-unkept", "3.5 characters of silence stand before each request"),
     mutant("pause-unkept", "each slave has its pause"),
     mutant("edge-repeated", "an edge is written once"),

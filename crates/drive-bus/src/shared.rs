@@ -52,6 +52,8 @@ pub(crate) struct Shared {
     rounds: AtomicU64,
     /// How often the port was lost.
     losses: watch::Sender<u64>,
+    /// How many values were withdrawn.
+    retractions: watch::Sender<u64>,
     /// Tells the task that the master has something new to do.
     pub(crate) wake: Notify,
 }
@@ -64,6 +66,7 @@ impl Shared {
             last: Arc::default(),
             rounds: AtomicU64::new(0),
             losses: watch::Sender::new(0),
+            retractions: watch::Sender::new(0),
             wake: Notify::new(),
         }
     }
@@ -97,6 +100,16 @@ impl Shared {
     /// How often the port was lost, for who waits for that.
     pub(crate) fn losses(&self) -> watch::Receiver<u64> {
         self.losses.subscribe()
+    }
+
+    /// So many values were withdrawn so far.
+    pub(crate) fn tell_retractions(&self, retractions: u64) {
+        self.retractions.send_if_modified(|told| std::mem::replace(told, retractions) != retractions);
+    }
+
+    /// How many values were withdrawn, for who waits for the next.
+    pub(crate) fn retractions(&self) -> watch::Receiver<u64> {
+        self.retractions.subscribe()
     }
 
     fn close(&self) {

@@ -78,6 +78,12 @@ impl Slave {
         self.handle.shared.master().retracted(self.address)
     }
 
+    /// How many values of all slaves of its line were withdrawn: whenever that changes [`retracted`](Self::retracted) may have.
+    #[must_use]
+    pub fn retractions(&self) -> watch::Receiver<u64> {
+        self.handle.shared.retractions()
+    }
+
     /// When the last exchange began that it has answered, also by an exception and whoever has asked: not before then has it
     /// heard a frame of this line, so its watchdog runs from there. `None`: it has answered nothing yet.
     #[must_use]

@@ -146,7 +146,7 @@ impl Task {
         loop {
             self.read_rest().await;
             self.serve_second();
-            let (frame, deadline, finished, asked_at, mute) = {
+            let (frame, deadline, finished, asked_at, mute, retractions) = {
                 let now = Instant::now();
                 let mut master = self.shared.master();
                 master.handle_timeout(now);
@@ -155,8 +155,9 @@ impl Task {
                 let frame = master.poll_transmit(now);
                 self.awake.take_if(|_| !master.is_busy());
                 self.ended.extend(std::iter::from_fn(|| master.poll_outcome()));
-                (frame, master.deadline(), master.is_finished(), asked_at, mute)
+                (frame, master.deadline(), master.is_finished(), asked_at, mute, master.retractions())
             };
+            self.shared.tell_retractions(retractions);
             let answered = !self.ended.is_empty();
             for (caller, outcome) in self.ended.drain(..) {
                 caller.answer(outcome, asked_at);

@@ -209,8 +209,8 @@ fn what_comes_once_more_though_it_was_owed_withdraws_what_was_taken_instead() {
 }
 
 /// Reads of five registers of one word in a row, of a far end that says one answer in ten once more after 4, 10 or 30 ms. Gives how
-/// many were told wrong, and how many of them after the first was withdrawn.
-async fn wrong_beside_doubles(seed: u64) -> (u32, u32) {
+/// many were told wrong behind the first row, in which nothing is known of them.
+async fn wrong_beside_doubles(seed: u64) -> u32 {
     let (ours, far) = tokio::io::duplex(4_096);
     let line = Line::over(ours, LineConfig { far_end_paces: Some(false), ..LineConfig::stream(SERIAL) });
     let (mut from, mut to) = tokio::io::split(far);
@@ -238,30 +238,21 @@ async fn wrong_beside_doubles(seed: u64) -> (u32, u32) {
         }
     });
     let mut slave = line.slave(1).with_terms(Terms::of(Class::Status));
-    let (mut wrong, mut wrong_later) = (0, 0);
-    for _ in 0..200 {
+    let mut wrong = 0;
+    for row in 0..200 {
         for register in 1..=5 {
-            let was_withdrawn = slave.retracted().is_some();
             if let Ok(words) = read(&mut slave, register, 1).await {
-                let is_wrong = u32::from(words[0] != register);
-                wrong += is_wrong;
-                wrong_later += if was_withdrawn { is_wrong } else { 0 };
+                wrong += u32::from(row > 0 && words[0] != register);
             }
         }
         sleep(400 * MS).await;
     }
-    (wrong, wrong_later)
+    wrong
 }
 
 #[tokio::test(start_paused = true)]
-async fn of_answers_that_come_twice_now_and_then_the_first_alone_puts_a_row_of_reads_out_of_step() {
-    let mut all = 0;
+async fn of_answers_that_come_twice_now_and_then_none_puts_a_row_of_reads_out_of_step() {
     for seed in 0..20 {
-        let (wrong, later) = wrong_beside_doubles(seed).await;
-        assert_eq!(later, 0, "{wrong} wrong, {later} of them later, seed {seed}");
-        all += wrong;
+        assert_eq!(wrong_beside_doubles(seed).await, 0, "wrong of 1 000, seed {seed}");
     }
-    println!("{all} of 20000 were wrong");
-    // At most a row of five each.
-    assert!(all <= 20 * 4, "{all}");
 }

@@ -57,7 +57,8 @@ async fn a_line_keeps_no_exchanges_unless_it_is_asked_to_and_then_no_more_than_t
     for kept in [0, 2] {
         line.keep_exchanges(kept);
         for word in 0..3 {
-            let (got, _) = tokio::join!(read(&mut slave, word, 1), peer.answer(&[3, 2, 0, 1]));
+            let answer = [3, 2, 0, word as u8];
+            let (got, _) = tokio::join!(read(&mut slave, word, 1), peer.answer(&answer));
             got.unwrap();
         }
         let addresses: Vec<u8> = line.exchanges().iter().map(|Exchange { request, .. }| request[3]).collect();

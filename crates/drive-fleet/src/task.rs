@@ -45,6 +45,7 @@ impl Task {
         let Self { mut drive, mut desk, mut messages, mut urgent, turns, mut keeper, answers } = self;
         let mut open = true;
         let mut losses = answers.port_losses();
+        let mut retractions = answers.retractions();
         // Kept across the steps, so that a drive does not lose its place in the row.
         let mut waits_for_turn = None;
         let mut turn: Option<OwnedSemaphorePermit> = None;
@@ -76,6 +77,7 @@ impl Task {
             if let Some(ground) = drive.take_changed() {
                 desk.supervisor.handle_changed(Instant::now(), ground);
             }
+            retractions.mark_unchanged();
             if let Some(at) = answers.retracted() {
                 desk.supervisor.handle_retracted(Instant::now(), at);
             }
@@ -134,7 +136,12 @@ impl Task {
                         }
                     },
                     // What is left of a call would be sent to whoever answers now.
-                    () = lost(&mut losses) => desk.supervisor.handle_line_lost(Instant::now()),
+                    () = changed(&mut losses) => desk.supervisor.handle_line_lost(Instant::now()),
+                    // However long the call under way takes, what is withdrawn is good for nobody any more.
+                    () = changed(&mut retractions) => match answers.retracted() {
+                        Some(at) => desk.supervisor.handle_retracted(Instant::now(), at),
+                        None => continue,
+                    },
                     (reply, lease) = &mut call => {
                         // What it says is judged by what stands now.
                         desk.supervisor.handle_lease(lease);
@@ -181,9 +188,9 @@ impl Task {
     }
 }
 
-/// Until the line loses its port.
-async fn lost(losses: &mut watch::Receiver<u64>) {
-    if losses.changed().await.is_err() {
+/// Until the line counts one more.
+async fn changed(count: &mut watch::Receiver<u64>) {
+    if count.changed().await.is_err() {
         // Nobody will tell it any more.
         std::future::pending::<()>().await;
     }

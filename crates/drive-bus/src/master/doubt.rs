@@ -11,7 +11,7 @@ use crate::{config::DOUBLE, exchange::Frame, shape::Shape};
 pub(super) const MEMORY: Duration = Duration::from_secs(60);
 
 /// What comes later than this is no second answer to what was taken.
-const LONGEST_DOUBLE: Duration = Duration::from_secs(1);
+pub(super) const LONGEST_DOUBLE: Duration = Duration::from_secs(1);
 
 /// How many answers are remembered by what they say: those of a second, where they are not asked for without a pause.
 const LATELY: usize = 32;

@@ -6,11 +6,16 @@ use drive_core::{Class, Effect, PortError};
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-use super::{Asked, Flight, Master, Purpose, port::PortState, probing::Question};
+use super::{
+    Asked, Flight, Master, Purpose,
+    port::PortState,
+    probing::Question,
+    row::{self, Come},
+};
 use crate::{
     answer, config,
     evidence::{Ended, Over},
-    exchange::{Answer, Failure, NOBODY_ANSWERED},
+    exchange::{Answer, Failure, Frame, NOBODY_ANSWERED},
     protocol::Protocol,
     record::Ending,
     schedule::Entry,
@@ -19,6 +24,17 @@ use crate::{
 
 /// The length of an exception: its function code and its number.
 const EXCEPTION: usize = 2;
+
+/// Whether a request reads what a slave may answer otherwise the next time.
+fn is_read<C>(flight: &Flight<C>) -> bool {
+    matches!(
+        *flight.request,
+        Request::ReadCoils(..)
+            | Request::ReadDiscreteInputs(..)
+            | Request::ReadHoldingRegisters(..)
+            | Request::ReadInputRegisters(..)
+    )
+}
 
 impl<C> Master<C> {
     /// The exchange that is under way ends with `result`.
@@ -36,6 +52,13 @@ impl<C> Master<C> {
         let may_be_late = self.may_be_late(now, &flight, &result);
         if may_be_late && matches!(flight.purpose, Purpose::Call(_)) {
             return self.ask_again(now, flight, &result);
+        }
+        let mut result = result;
+        if let Some((frame, times)) = self.doubted(now, &flight, &result) {
+            if times < row::MOST_TIMES {
+                return self.ask_once_more(now, flight, &result, (frame, times));
+            }
+            result = Err(Failure::Doubted("each time it was asked it said what another read had said"));
         }
         self.record.ended(now, slave, flight.started, Ending::of(&result));
         let expected = answer::likely_len(&flight.request);
@@ -129,30 +152,75 @@ impl<C> Master<C> {
     /// Whether it may be the answer to an earlier question that looks the same, and that was never heard: the far end may have kept it
     /// until this question came.
     fn may_be_late(&self, now: Instant, flight: &Flight<C>, result: &Result<Answer, Failure>) -> bool {
-        let is_read = matches!(
-            *flight.request,
-            Request::ReadCoils(..)
-                | Request::ReadDiscreteInputs(..)
-                | Request::ReadHoldingRegisters(..)
-                | Request::ReadInputRegisters(..)
-        );
-        let station = self.stations.get(&flight.slave).filter(|_| is_read && matches!(result, Ok(Ok(_))));
+        let station =
+            self.stations.get(&flight.slave).filter(|_| is_read(flight) && matches!(result, Ok(Ok(_))));
         let may_be = station.is_some_and(|station| station.doubt.may_be_late(now, flight.shape));
         may_be && self.exchange.confuses_late_answers()
+    }
+
+    /// What came to a read, where it may be the answer to another one that came twice, and how often that was so.
+    fn doubted(
+        &self,
+        now: Instant,
+        flight: &Flight<C>,
+        result: &Result<Answer, Failure>,
+    ) -> Option<(Frame, u32)> {
+        let Purpose::Call(Some(entry)) = &flight.purpose else { return None };
+        let come = self.come(flight, result.as_ref().ok()?)?;
+        let row = &self.stations.get(&flight.slave)?.row;
+        let is_doubtful = crate::mutant!("row-out-of-step-believed", row.is_doubtful(now, come), false);
+        let times = entry.work.doubted.map_or(1, |(_, times)| times + 1);
+        is_doubtful.then_some((come.frame, times))
+    }
+
+    /// What came to a read, where nothing but its shape tells whose answer it is.
+    fn come(&self, flight: &Flight<C>, answer: &Answer) -> Option<Come> {
+        let is_it = answer.is_ok() && is_read(flight) && self.exchange.confuses_late_answers();
+        let frame = self.exchange.taken().filter(|_| is_it)?;
+        Some(Come { question: flight.asks, asked_at: flight.asked_at, frame, before: flight.doubted() })
+    }
+
+    /// Before anybody is told what came the same is asked once more: nothing of it counts but that the slave is there.
+    fn ask_once_more(
+        &mut self,
+        now: Instant,
+        flight: Flight<C>,
+        result: &Result<Answer, Failure>,
+        doubted: (Frame, u32),
+    ) {
+        let slave = flight.slave;
+        let expected = answer::likely_len(&flight.request);
+        self.set_aside(now, &flight, result, Ended::Answered(expected));
+        self.note_alive(now, slave);
+        if let Purpose::Call(Some(mut entry)) = flight.purpose {
+            entry.work.doubted = Some(doubted);
+            self.schedule.put_back(entry);
+        }
+    }
+
+    /// An exchange is over whose answer nobody is told.
+    fn set_aside(
+        &mut self,
+        now: Instant,
+        flight: &Flight<C>,
+        result: &Result<Answer, Failure>,
+        ended: Ended,
+    ) {
+        let slave = flight.slave;
+        self.record.ended(now, slave, flight.started, Ending::of(result));
+        let expected = answer::likely_len(&flight.request);
+        let is_rtu = self.config.protocol == Protocol::Rtu;
+        self.evidence.ended(now, (Over::First, slave), is_rtu, ended, expected);
+        let took = now.saturating_duration_since(flight.started);
+        self.stats.busy += took + self.config.silence();
+        self.station(slave).stats.exchanges.record(took);
     }
 
     /// The answer is nobody's, and the question asked again once its own could have come.
     fn ask_again(&mut self, now: Instant, flight: Flight<C>, result: &Result<Answer, Failure>) {
         let slave = flight.slave;
-        self.record.ended(now, slave, flight.started, Ending::of(result));
-        let expected = answer::likely_len(&flight.request);
-        let is_rtu = self.config.protocol == Protocol::Rtu;
-        self.evidence.ended(now, (Over::First, slave), is_rtu, Ended::Unclear, expected);
-        let took = now.saturating_duration_since(flight.started);
-        self.stats.busy += took + self.config.silence();
-        let station = self.station(slave);
-        station.stats.exchanges.record(took);
-        station.stats.outcomes.mismatches += 1;
+        self.set_aside(now, &flight, result, Ended::Unclear);
+        self.station(slave).stats.outcomes.mismatches += 1;
         self.throw_away_for(now, &flight);
         self.note_alive(now, slave);
         match flight.purpose {
@@ -234,6 +302,13 @@ impl<C> Master<C> {
 
     fn note_answer(&mut self, now: Instant, flight: &Flight<C>, answer: &Answer) {
         let again = self.again.filter(|(_, until)| *until > now).map(|(again, _)| again);
+        let read = self.come(flight, answer);
+        let again = if read.is_some_and(|read| read.contradicts_itself()) {
+            // One of its own may still be to come.
+            again.max(Some(flight.patience.max(config::DOUBLE)))
+        } else {
+            again
+        };
         let double = self.config.double_window.max(again.unwrap_or_default());
         let taken = self.exchange.taken();
         let expected = if answer.is_ok() { answer::likely_len(&flight.request) } else { EXCEPTION };
@@ -245,6 +320,10 @@ impl<C> Master<C> {
         self.nobody_answered(now, given_up);
         self.second.settled(now, flight.slave, flight.asked_at);
         let station = self.station(flight.slave);
+        match read {
+            Some(read) => station.row.told(now, read),
+            None => station.row.is_in_step(),
+        }
         station.doubt.is_in_step();
         station.answered_at = Some(flight.asked_at);
         // What has waited behind what was owed says nothing of its slave.

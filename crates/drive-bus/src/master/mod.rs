@@ -11,6 +11,7 @@ mod fresh;
 mod offline;
 mod port;
 mod probing;
+mod row;
 mod second;
 mod send;
 mod station;
@@ -109,6 +110,8 @@ pub struct Master<C> {
     stats: Stats,
     record: Record,
     evidence: Evidence,
+    /// How many values were withdrawn.
+    retractions: u64,
 }
 
 /// What is asked, and by whom.
@@ -125,6 +128,8 @@ struct Asked<C> {
     asked_longer: bool,
     /// It went over the second connection too.
     went_second: bool,
+    /// What came when it was asked last, which may have been the answer to another read, and how often that was so.
+    doubted: Option<(Frame, u32)>,
     /// What became of the last attempt.
     last: Option<PortError>,
 }
@@ -135,7 +140,9 @@ struct Flight<C> {
     slave: u8,
     request: Arc<Request<'static>>,
     shape: Shape,
-    /// A check over it, where it writes.
+    /// A check over what it asks.
+    asks: u16,
+    /// The same, where it writes.
     wrote: Option<u16>,
     /// Somebody's stop, whether he still waits for it or not.
     is_stop: bool,
@@ -159,6 +166,12 @@ struct Flight<C> {
 }
 
 impl<C> Flight<C> {
+    /// What came when it was asked just before, and was told nobody.
+    fn doubted(&self) -> Option<Frame> {
+        let Purpose::Call(Some(entry)) = &self.purpose else { return None };
+        entry.work.doubted.map(|(frame, _)| frame)
+    }
+
     /// What the far end was asked, if it was and somebody is to answer.
     fn asked(&self) -> Option<far_end::Asked> {
         let sent = self.sent.filter(|sent| sent.unanswered_until.is_none())?;
@@ -235,6 +248,7 @@ impl<C> Master<C> {
             stats: Stats::default(),
             record: Record::default(),
             evidence: Evidence::default(),
+            retractions: 0,
             config,
         };
         master.set_far_end_paces(master.config.endpoint.is_serial());
@@ -289,6 +303,7 @@ impl<C> Master<C> {
             echo_was_read: false,
             asked_longer: false,
             went_second: false,
+            doubted: None,
             last: None,
         };
         let (ticket, replaced) = self
@@ -538,7 +553,7 @@ impl<C> Master<C> {
                 Stray::Early { slave, frame } => {
                     let station = self.station(slave);
                     station.stats.early += 1;
-                    let heard = station.doubt.heard(now, frame, false);
+                    let heard = station.heard(now, frame, false);
                     self.evidence.stray(now, Over::First, slave, What::Early);
                     self.note_heard(now, slave, heard);
                 }
@@ -586,7 +601,7 @@ impl<C> Master<C> {
             self.evidence.stray(now, Over::First, slave, what);
             return;
         };
-        let heard = if confuses { station.doubt.heard(now, frame, is_request) } else { Heard::default() };
+        let heard = if confuses { station.heard(now, frame, is_request) } else { Heard::default() };
         let late = heard.was_owed;
         self.evidence.stray(
             now,
@@ -628,12 +643,18 @@ impl<C> Master<C> {
             let station = self.station(slave);
             station.stats.retracted += 1;
             station.retracted = Some(asked_at);
+            self.retractions += 1;
         }
     }
 
     /// When the last value of a slave was asked for that another answer has withdrawn.
     pub(crate) fn retracted(&self, slave: u8) -> Option<Instant> {
         self.stations.get(&slave)?.retracted
+    }
+
+    /// How many values were withdrawn so far, of all slaves.
+    pub(crate) const fn retractions(&self) -> u64 {
+        self.retractions
     }
 
     /// When the last question began that a slave has answered.

@@ -5,7 +5,7 @@ use std::mem;
 use drive_core::{Class, PortError};
 use tokio::time::Instant;
 
-use super::{Asked, Flight, Master};
+use super::{Asked, Flight, Master, row::Row};
 use crate::schedule::Entry;
 
 /// The state of the port.
@@ -51,6 +51,8 @@ impl<C> Master<C> {
         self.port = PortState::Opening(Some(reason.to_owned()));
         self.stats.lost += 1;
         self.exchange.reset();
+        // Over the next one another may answer.
+        self.stations.values_mut().for_each(|station| station.row = Row::default());
         let asked = self.flight.as_ref().and_then(Flight::asked);
         self.far_end.lost(asked);
         self.end_second(now);

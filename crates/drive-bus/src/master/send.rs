@@ -159,7 +159,7 @@ impl<C> Master<C> {
             return self.begin_read(now, slave, Purpose::EchoRead);
         }
         self.called_at = Some(now);
-        if entry.work.attempts == 0 && entry.work.last.is_none() {
+        if entry.work.attempts == 0 && entry.work.last.is_none() && entry.work.doubted.is_none() {
             let class = self.stats.class_mut(entry.terms.class);
             class.sent += 1;
             let waited = now.saturating_duration_since(entry.arrived);
@@ -226,12 +226,12 @@ impl<C> Master<C> {
         };
         let is_write = self.exchange.is_write(&request);
         let first = crate::mutant!("first-answer-believed", self.fresh.is_first(), false);
-        let check = is_write.then(|| Frame::of(pdu).check);
-        let wrote = check.filter(|_| self.exchange.confirms_late());
+        let asks = Frame::of(pdu).check;
+        let wrote = Some(asks).filter(|_| is_write && self.exchange.confirms_late());
         let doubt = &mut self.station(slave).doubt;
         let suspect = first || doubt.owes(now, shape, wrote);
-        if let Some(check) = check {
-            doubt.written(shape, check);
+        if is_write {
+            doubt.written(shape, asks);
         }
         let answer = answer::likely_len(&request);
         self.longest = (self.longest.0.max(pdu.len()), self.longest.1.max(answer));
@@ -243,6 +243,7 @@ impl<C> Master<C> {
             slave,
             request,
             shape,
+            asks,
             wrote,
             more,
             suspect,

@@ -5,10 +5,15 @@ use std::{sync::Arc, time::Duration};
 use tokio::time::Instant;
 use tokio_modbus::Request;
 
-use super::{Asked, doubt::Doubt};
+use super::{
+    Asked,
+    doubt::{Doubt, Heard},
+    row::Row,
+};
 use crate::{
     answer,
     config::{LineConfig, SlaveSettings},
+    exchange::Frame,
     schedule::Entry,
     stats::SlaveStats,
     timeout::LearnedTimeout,
@@ -31,6 +36,7 @@ pub(super) struct Station {
     /// Its own pause is over at this time.
     pub(super) ready_at: Option<Instant>,
     pub(super) doubt: Doubt,
+    pub(super) row: Row,
     /// When the last of its values was asked for that was withdrawn.
     pub(super) retracted: Option<Instant>,
     /// When the last question began that it has answered.
@@ -52,6 +58,7 @@ impl Station {
             stats: SlaveStats::default(),
             ready_at: None,
             doubt: Doubt::default(),
+            row: Row::default(),
             retracted: None,
             answered_at: None,
             failures: 0,
@@ -77,6 +84,13 @@ impl Station {
     /// A read that does no harm and whose answer no echo can be taken for: the last that was asked, or one register.
     pub(super) fn harmless_read(&self) -> Arc<Request<'static>> {
         self.last_read.clone().unwrap_or_else(|| Arc::new(Request::ReadHoldingRegisters(0, 1)))
+    }
+
+    /// An intact frame of its came that was no answer to what was asked, or another master's request for one.
+    pub(super) fn heard(&mut self, now: Instant, frame: Frame, is_request: bool) -> Heard {
+        let heard = self.doubt.heard(now, frame, is_request);
+        let out_of_step = if is_request { None } else { self.row.heard(now, frame.shape) };
+        Heard { withdraws: out_of_step.or(heard.withdraws), ..heard }
     }
 
     /// It has answered, at `now`.

@@ -12,7 +12,7 @@ use crate::{
 /// What was withdrawn.
 #[derive(Debug)]
 pub(super) struct Retraction {
-    /// The last that the line has told.
+    /// The last that has withdrawn a status.
     told: Option<Instant>,
     /// The status that stands was withdrawn.
     pub(super) is_open: bool,
@@ -45,11 +45,9 @@ impl Retraction {
 
 impl Supervisor {
     /// What was asked for at this time counts for nothing: another, different answer has come to it. The status is asked for
-    /// anew, and a stop that it has confirmed goes on.
-    pub(crate) fn handle_retracted(&mut self, now: Instant, at: Instant) {
-        if self.retraction.told.replace(at) == Some(at) {
-            return;
-        }
+    /// anew, and a stop that it has confirmed goes on. That a reading under way counts for nothing is told once it is taken. Gives
+    /// whether the job in flight has to be dropped for it.
+    pub(crate) fn handle_retracted(&mut self, now: Instant, at: Instant) -> bool {
         if self
             .measurements
             .as_ref()
@@ -58,9 +56,9 @@ impl Supervisor {
             self.measurements = None;
             self.changed = true;
         }
-        let Some(read) = self.status.as_ref().map(|status| status.at) else { return };
-        if at < read || self.retraction.status_taken < at {
-            return;
+        let Some(read) = self.status.as_ref().map(|status| status.at) else { return false };
+        if at < read || self.retraction.status_taken < at || self.retraction.told.replace(at) == Some(at) {
+            return false;
         }
         self.retraction.is_open = true;
         self.emit_by(EventKind::ValueWithdrawn, Cause::Found);
@@ -71,6 +69,8 @@ impl Supervisor {
         {
             let by = Asker::Policy(Policy::ValueWithdrawn);
             self.stop_by_policy(now, by, mode);
+            return self.drops_for_stop();
         }
+        false
     }
 }
