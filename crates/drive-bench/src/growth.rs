@@ -4,7 +4,6 @@ use std::{fs, path::Path, time::Duration};
 
 use drive_bus::{Line, LineConfig};
 use drive_core::serial::SerialSettings;
-use rustix::process::{Resource, getrlimit, setrlimit};
 use tokio::{runtime::Runtime, time::sleep};
 
 use crate::{
@@ -15,7 +14,7 @@ use crate::{
     report::{Goal, Report, Unit, micros, millis},
     rig::DRIVES,
     simulator::Counted,
-    usage::{memory_kib, processor_time},
+    usage::{allow_descriptors, memory_kib, processor_time},
 };
 
 const SECTION: &str = "growth";
@@ -176,11 +175,4 @@ fn describe(report: &mut Report, shown: &Shown, last: bool) {
     let what =
         format!("silences too short in {} reads (the shortest {shortest:.3} ms)", shown.counted.requests);
     report.row(SECTION, name(&what), Unit::Count, shown.counted.violations as f64, Goal::AtMost(0.0));
-}
-
-/// Two timers a line are more descriptors than a shell allows.
-fn allow_descriptors() -> Result<(), Error> {
-    let mut limit = getrlimit(Resource::Nofile);
-    limit.current = limit.maximum;
-    Ok(setrlimit(Resource::Nofile, limit)?)
 }

@@ -10,6 +10,7 @@ mod doors;
 mod far_end;
 mod faults;
 mod first_look;
+mod fleet;
 mod growth;
 mod ledger;
 mod lines;
@@ -51,17 +52,21 @@ enum Section {
     Lines,
     /// From one line to a thousand in one process, the drives in the same process.
     Growth,
+    /// A whole plant over a thousand lines of 31 drives: memory, processor, ages, a stop of all of them.
+    Fleet,
     /// Wrong values accepted as right, over every fault of the simulator.
     Faults,
     /// A gateway with a dead drive behind it, connections that replay or go mute, a process that stands still.
     Strangers,
     /// The wait of a stop at each door of the daemon while somebody attacks another; wants `drived` built beside this program.
     Doors,
+    /// The same while a thousand read, ten thousand commands a second are offered, 256 clients of a gateway ask; and what these get.
+    Loads,
     /// When the page's stop is usable and its first value there, near and far; wants `drived` built beside this program, and Chromium.
     FirstLook,
 }
 
-const EVERYTHING: [Section; 9] = [
+const EVERYTHING: [Section; 10] = [
     Section::Utilisation,
     Section::Parts,
     Section::Stop,
@@ -69,6 +74,7 @@ const EVERYTHING: [Section; 9] = [
     Section::Cpu,
     Section::Lines,
     Section::Growth,
+    Section::Fleet,
     Section::Faults,
     Section::Strangers,
 ];
@@ -92,7 +98,7 @@ struct Arguments {
     /// How many lines in one process.
     #[arg(long, default_value_t = 256, value_parser = clap::value_parser!(u16).range(1..=2_048))]
     lines: u16,
-    /// Up to how many lines the growth is measured.
+    /// Up to how many lines the growth, and a whole plant, is measured.
     #[arg(long, default_value_t = 1_000, value_parser = clap::value_parser!(u16).range(1..=4_096))]
     most_lines: u16,
     /// Where to draw the growth, as an SVG.
@@ -162,7 +168,9 @@ fn measure(report: &mut Report, section: Section, arguments: &Arguments) -> Resu
         Section::Cpu => cpu::measure(report, time),
         Section::Lines => lines::measure(report, time, arguments.lines),
         Section::Growth => growth::measure(report, time, arguments.most_lines, arguments.plot.as_deref()),
+        Section::Fleet => fleet::measure(report, time, arguments.most_lines),
         Section::Doors => doors::measure(report, &arguments.doors),
+        Section::Loads => doors::measure_loads(report, &arguments.doors),
         Section::FirstLook => first_look::measure(report),
         Section::Faults => faults::measure(report, arguments.seed, arguments.transactions),
         Section::Strangers => strangers::measure(report),

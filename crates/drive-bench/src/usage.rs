@@ -5,7 +5,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use rustix::time::{ClockId, clock_gettime};
+use rustix::{
+    process::{Resource, getrlimit, setrlimit},
+    time::{ClockId, clock_gettime},
+};
 
 use crate::Error;
 
@@ -62,7 +65,19 @@ impl Machine {
 
 /// Memory that this process holds, in KiB: its resident pages.
 pub(crate) fn memory_kib() -> Result<u64, Error> {
-    let statm = fs::read_to_string("/proc/self/statm")?;
+    memory_of("self")
+}
+
+/// The same of a process by its number.
+pub(crate) fn memory_of(process: &str) -> Result<u64, Error> {
+    let statm = fs::read_to_string(format!("/proc/{process}/statm"))?;
     let pages: u64 = statm.split_whitespace().nth(1).ok_or("no resident pages in statm")?.parse()?;
     Ok(pages * (rustix::param::page_size() as u64 / 1_024))
+}
+
+/// Lines by the hundred, and clients by the thousand, are more descriptors than a shell allows.
+pub(crate) fn allow_descriptors() -> Result<(), Error> {
+    let mut limit = getrlimit(Resource::Nofile);
+    limit.current = limit.maximum;
+    Ok(setrlimit(Resource::Nofile, limit)?)
 }

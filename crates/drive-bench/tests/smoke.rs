@@ -70,6 +70,15 @@ fn the_growth_is_measured_line_by_line_and_no_silence_is_too_short() {
 }
 
 #[test]
+fn a_whole_plant_is_polled_in_its_periods_and_a_stop_of_all_of_it_is_confirmed_within_its_bound() {
+    let rows = rows("fleet");
+    assert_eq!(row(&rows, "3 lines x 31 drives: statuses that are missing or too old")["value"], 0.0);
+    assert_eq!(row(&rows, "3 lines x 31 drives: … until the last drive has it, by the bound")["met"], true);
+    let confirmed = &row(&rows, "3 lines x 31 drives: … until all is confirmed")["value"];
+    assert!(confirmed.as_f64().is_some_and(|ms| ms > 0.0));
+}
+
+#[test]
 fn our_line_is_measured_beside_the_masters_of_others() {
     let rows = rows("utilisation");
     for master in

@@ -1,8 +1,10 @@
 //! [`Fleet`]: the handle of it all.
 
 use std::{
+    collections::HashMap,
     fmt,
     future::poll_fn,
+    ops::Deref,
     pin::Pin,
     sync::{
         Arc, Mutex, PoisonError, RwLock,
@@ -34,6 +36,43 @@ use crate::{
 pub(crate) struct Members {
     pub(crate) lines: Vec<Arc<LineEntry>>,
     pub(crate) entries: Vec<Arc<Entry>>,
+}
+
+/// The same, where each is found by his name and by his line without a walk over all: a stop of all asks for every one of them.
+#[derive(Default)]
+pub(crate) struct Roster {
+    members: Members,
+    by_name: HashMap<Arc<str>, usize>,
+    /// By the name of the line, in the order in which they were added.
+    by_line: HashMap<Arc<str>, Vec<usize>>,
+}
+
+impl Deref for Roster {
+    type Target = Members;
+
+    fn deref(&self) -> &Members {
+        &self.members
+    }
+}
+
+impl Roster {
+    fn new(members: Members) -> Self {
+        let mut by_line = HashMap::<_, Vec<usize>>::new();
+        for (number, entry) in members.entries.iter().enumerate() {
+            by_line.entry(Arc::clone(&entry.line.name)).or_default().push(number);
+        }
+        let by_name = members.entries.iter().map(|entry| Arc::clone(&entry.name)).zip(0..).collect();
+        Self { members, by_name, by_line }
+    }
+
+    fn named(&self, name: &str) -> Option<&Arc<Entry>> {
+        self.members.entries.get(*self.by_name.get(name)?)
+    }
+
+    pub(crate) fn on_line(&self, line: &str) -> impl Iterator<Item = &Arc<Entry>> {
+        let numbers = self.by_line.get(line).into_iter().flatten();
+        numbers.filter_map(|number| self.members.entries.get(*number))
+    }
 }
 
 impl Members {
@@ -87,7 +126,7 @@ pub struct Fleet {
 }
 
 pub(crate) struct Inner {
-    members: RwLock<Arc<Members>>,
+    members: RwLock<Arc<Roster>>,
     /// One change of the members at a time.
     pub(crate) changing: Mutex<()>,
     /// Gone when the fleet has shut down, so that readers see its end.
@@ -111,7 +150,7 @@ impl fmt::Debug for Fleet {
 impl Fleet {
     pub(crate) fn new(members: Members, events: Teller, first: broadcast::Receiver<Event>) -> Self {
         let inner = Inner {
-            members: RwLock::new(Arc::new(members)),
+            members: RwLock::new(Arc::new(Roster::new(members))),
             changing: Mutex::default(),
             events: Mutex::new(Some(events)),
             acts: AtomicU64::new(0),
@@ -125,8 +164,7 @@ impl Fleet {
     #[must_use]
     pub fn drive(&self, name: &str) -> Option<DriveHandle> {
         let members = self.members();
-        let entry = members.entries.iter().find(|entry| &*entry.name == name)?;
-        Some(DriveHandle::new(Arc::clone(entry)))
+        members.named(name).map(|entry| DriveHandle::new(Arc::clone(entry)))
     }
 
     /// All drives, in the order in which they were added.
@@ -145,8 +183,7 @@ impl Fleet {
     #[must_use]
     pub fn drives_on(&self, line: &str) -> Vec<DriveHandle> {
         let members = self.members();
-        let on_line = members.entries.iter().filter(|entry| &*entry.line.name == line);
-        on_line.map(|entry| DriveHandle::new(Arc::clone(entry))).collect()
+        members.on_line(line).map(|entry| DriveHandle::new(Arc::clone(entry))).collect()
     }
 
     /// What happens to the drives, from now on; the first reader gets it from the start of the fleet.
@@ -188,7 +225,7 @@ impl Fleet {
         format!("group-{}", self.inner.acts.fetch_add(1, Ordering::Relaxed) + 1)
     }
 
-    pub(crate) fn members(&self) -> Arc<Members> {
+    pub(crate) fn members(&self) -> Arc<Roster> {
         Arc::clone(&self.inner.members.read().unwrap_or_else(PoisonError::into_inner))
     }
 
@@ -203,7 +240,7 @@ impl Fleet {
 
     /// Exchanges the members. Who changes them holds [`Inner::changing`].
     pub(crate) fn set_members(&self, members: Members) {
-        *self.inner.members.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(members);
+        *self.inner.members.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(Roster::new(members));
     }
 
     /// Where events are told; `None` after the shut-down.

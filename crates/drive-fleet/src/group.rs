@@ -2,7 +2,7 @@
 
 use std::{
     borrow::Cow,
-    collections::BTreeSet,
+    collections::{HashMap, HashSet},
     fmt,
     sync::{
         Arc,
@@ -22,7 +22,7 @@ use tokio_modbus::{Request, client::Client};
 
 use crate::{
     cause::Act,
-    fleet::{Fleet, Members},
+    fleet::{Fleet, Roster},
     group_ticket::{GroupStop, GroupTicket, StopReport, Told},
     handle::{DriveHandle, Entry},
     line_entry::LineEntry,
@@ -210,21 +210,27 @@ impl Group {
         let (members, read_only): (Vec<&DriveHandle>, Vec<&DriveHandle>) =
             self.members.iter().partition(|member| member.entry.settings().control);
         let standing = self.fleet.members();
+        let meant: HashSet<&Arc<str>> = self.members.iter().map(DriveHandle::name).collect();
+        // By the line.
+        let mut silent = HashMap::<_, u32>::new();
+        for member in &members {
+            let is_silent = member.snapshot().link != Link::Connected;
+            *silent.entry(Arc::as_ptr(&member.entry.line)).or_default() += u32::from(is_silent);
+        }
         let mut broadcasts = Vec::new();
-        let mut patience = Vec::new();
+        let mut patience = HashMap::new();
         for line in &standing.lines {
+            let Some(silent) = silent.get(&Arc::as_ptr(line)) else { continue };
             // It is first on the line, and no start of before can come behind the stops of each.
-            if let Some(write) = self.common_write(&standing, line, order.mode).filter(|_| by_broadcast) {
+            if let Some(write) = common_write(&standing, &meant, line, order.mode).filter(|_| by_broadcast) {
                 broadcasts.push((Arc::clone(&line.name), self.broadcast(line, write)));
             }
-            let on_line = members.iter().filter(|member| Arc::ptr_eq(&member.entry.line, line));
-            let silent = on_line.filter(|member| member.snapshot().link != Link::Connected).count();
-            let mute = u32::try_from(silent).unwrap_or(u32::MAX).max(MUTE);
-            patience.push((line, line.plan().stop_all(mute) + line.line.worst_case_stop()));
+            let mute = MUTE.max(*silent);
+            patience.insert(Arc::as_ptr(line), line.plan().stop_all(mute) + line.line.worst_case_stop());
         }
         let stop = |member: &&DriveHandle| {
-            let of_line = patience.iter().find(|(line, _)| Arc::ptr_eq(&member.entry.line, line));
-            let stop = member.stop_within(order, of_line.map(|(_, patience)| *patience));
+            let patience = patience.get(&Arc::as_ptr(&member.entry.line)).copied();
+            let stop = member.stop_within(order, patience);
             (Arc::clone(member.name()), stop)
         };
         let each = members.iter().map(stop).collect();
@@ -246,29 +252,6 @@ impl Group {
             self.fleet.inner.runtime.spawn(sending);
         }
         sent
-    }
-
-    /// The write that stops every drive of a line, if it means a stop to all of them and all are meant.
-    fn common_write(
-        &self,
-        standing: &Members,
-        line: &Arc<LineEntry>,
-        mode: StopMode,
-    ) -> Option<BroadcastWrite> {
-        let group: BTreeSet<&Arc<str>> = self.members.iter().map(DriveHandle::name).collect();
-        let mut on_line = standing.entries.iter().filter(|entry| Arc::ptr_eq(&entry.line, line));
-        let write = |entry: &Arc<Entry>| {
-            let allowed = entry.settings().control && group.contains(&entry.name);
-            let write = entry.broadcasts.iter().find(|(stop, _)| *stop == mode).map(|(_, write)| *write);
-            write.filter(|_| allowed)
-        };
-        let first = write(on_line.next()?)?;
-        let is_common = on_line.all(|entry| write(entry) == Some(first));
-        let under_way = |entry: &Arc<Entry>| entry.snapshots.borrow().stop.map(|stop| strength(stop.mode));
-        let (all, any) = standing.on(line).map(under_way).fold((true, false), |(all, any), stop| {
-            (all && stop >= Some(strength(mode)), any || stop > Some(strength(mode)))
-        });
-        (is_common && !all && !any).then_some(first)
     }
 
     /// Starts every drive of the group, or none: first all are asked whether they would start, then they start, as close
@@ -389,6 +372,28 @@ impl Group {
         let stopped = self.stop_each(StopMode::Ramp.into(), false).finished().await;
         Err(GroupFailure::Failed { outcomes, stopped })
     }
+}
+
+/// The write that stops every drive of a line, if it means a stop to all of them and all are meant.
+fn common_write(
+    standing: &Roster,
+    meant: &HashSet<&Arc<str>>,
+    line: &LineEntry,
+    mode: StopMode,
+) -> Option<BroadcastWrite> {
+    let on_line = || standing.on_line(&line.name);
+    let write = |entry: &Arc<Entry>| {
+        let allowed = entry.settings().control && meant.contains(&entry.name);
+        let write = entry.broadcasts.iter().find(|(stop, _)| *stop == mode).map(|(_, write)| *write);
+        write.filter(|_| allowed)
+    };
+    let first = write(on_line().next()?)?;
+    let is_common = on_line().all(|entry| write(entry) == Some(first));
+    let under_way = |entry: &Arc<Entry>| entry.snapshots.borrow().stop.map(|stop| strength(stop.mode));
+    let (all, any) = on_line().map(under_way).fold((true, false), |(all, any), stop| {
+        (all && stop >= Some(strength(mode)), any || stop > Some(strength(mode)))
+    });
+    (is_common && !all && !any).then_some(first)
 }
 
 /// Waits until a drive that was started shows that it has reached its reference: that of the start, or the one that it

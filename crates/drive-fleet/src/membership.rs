@@ -76,7 +76,7 @@ impl Fleet {
     /// [`FleetError::NameTaken`], and as of [`reconfigure`](Self::reconfigure); nothing has changed then.
     pub fn rename(&self, old: &str, settings: DriveSettings) -> Result<(), FleetError> {
         let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut members = Members::clone(&self.members());
+        let mut members = Members::clone(&**self.members());
         if members.entries.iter().any(|entry| *entry.name == *settings.name) {
             return Err(FleetError::NameTaken(settings.name));
         }
@@ -132,7 +132,7 @@ impl Fleet {
             let actions = ended.await;
             // Not before: nobody waits for a policy with the lock in hand.
             let _changing = fleet.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
-            let mut members = Members::clone(&fleet.members());
+            let mut members = Members::clone(&**fleet.members());
             members.entries.retain(|entry| !leaving.iter().any(|left| Arc::ptr_eq(left, entry)));
             leaving.iter().for_each(|left| replan(&members, &left.line));
             fleet.set_members(members);
@@ -143,7 +143,7 @@ impl Fleet {
     /// Takes a line without drives out of the fleet, and gives it. `None` where the fleet has no such line, or drives on it.
     pub fn remove_line(&self, line: &str) -> Option<Line> {
         let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut members = Members::clone(&self.members());
+        let mut members = Members::clone(&**self.members());
         let at = members.lines.iter().position(|entry| &*entry.name == line)?;
         if members.on(members.lines.get(at)?).next().is_some() {
             return None;

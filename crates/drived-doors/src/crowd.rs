@@ -48,7 +48,7 @@ impl Limits {
     /// At a gateway with so many clients: one that asks every second or so is not put out for others.
     pub const fn of_gateway(clients: usize) -> Self {
         let silent_for = Duration::from_secs(2);
-        Self { connections: clients, per_address: clients, for_stops: 0, silent_for, ..Self::SOCKET }
+        Self { connections: clients, per_address: clients, for_stops: 8, silent_for, ..Self::SOCKET }
     }
 }
 
@@ -177,6 +177,10 @@ impl Crowd {
         Some(Place { crowd: self.clone(), id, shared })
     }
 
+    fn is_for_stops(&self, id: u64) -> bool {
+        self.lock().all.get(&id).is_some_and(|member| member.is_for_stops)
+    }
+
     fn lock(&self) -> MutexGuard<'_, Members> {
         self.members.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -194,6 +198,11 @@ impl Place {
     /// Waits until somebody else needs the place. Safe to drop.
     pub async fn wanted(&self) {
         self.shared.leave.notified().await;
+    }
+
+    /// Whether it is for stops alone.
+    pub fn is_for_stops(&self) -> bool {
+        self.crowd.is_for_stops(self.id)
     }
 
     /// Whether a request has come whole and is not answered.
@@ -250,7 +259,7 @@ impl Asking {
 
     /// Whether its place is for stops alone.
     pub(super) fn is_for_stops(&self) -> bool {
-        self.crowd.lock().all.get(&self.id).is_some_and(|member| member.is_for_stops)
+        self.crowd.is_for_stops(self.id)
     }
 
     /// Whether its answer may be an event stream, or there are too many.
@@ -345,13 +354,15 @@ mod tests {
         let (crowd, start) = (Crowd::new(Limits::of_gateway(16)), Instant::now());
         let second = Duration::from_secs(1);
         let idle: Vec<Place> = (0..16).map(|number| crowd.enter(address(number), start).unwrap()).collect();
-        assert!(crowd.enter(address(100), start + second).is_none(), "they have just come");
+        let is_for_stops = |number, now| crowd.enter(address(number), now).unwrap().is_for_stops();
+        assert!(is_for_stops(100, start + second), "they have just come");
         idle.iter().take(15).for_each(|place| place.hear(start + 9 * second));
         let scada = crowd.enter(address(100), start + 10 * second).unwrap();
+        assert!(!scada.is_for_stops());
         assert!(!crowd.lock().all.contains_key(&idle[15].id), "the one that has asked nothing");
-        assert!(crowd.enter(address(101), start + 10 * second).is_none());
+        assert!(is_for_stops(101, start + 10 * second));
         drop(scada);
-        assert!(crowd.enter(address(101), start + 10 * second).is_some());
+        assert!(!is_for_stops(101, start + 10 * second));
     }
 
     #[test]
@@ -359,13 +370,14 @@ mod tests {
         let (crowd, start) = (Crowd::new(Limits::of_gateway(16)), Instant::now());
         let mut held: Vec<Place> = (0..16).map(|_| crowd.enter(address(1), start).unwrap()).collect();
         let scada = crowd.enter(address(2), start).expect("sixteen of one address have said nothing");
+        assert!(!scada.is_for_stops());
         assert_eq!(crowd.lock().all.len(), 16);
         // Nor does he get its place back before it has asked.
-        assert!(crowd.enter(address(1), start).is_none());
+        assert!(crowd.enter(address(1), start).unwrap().is_for_stops());
         assert!(crowd.lock().all.contains_key(&scada.id));
         // Those that ask stay, whatever address they are of.
         held.iter().for_each(|place| place.hear(start));
-        assert!(crowd.enter(address(3), start).is_none());
+        assert!(crowd.enter(address(3), start).unwrap().is_for_stops());
         held.clear();
     }
 

@@ -61,10 +61,10 @@ pub(super) async fn serve(
             tracing::warn!("gateway {name}: {peer} was put out ({}), {count} of these in all", why.name());
         }
     }
-    if ended.is_some() || !takes_more {
+    if ended.is_some_and(|why| why != Ended::Full) || !takes_more {
         return;
     }
-    // Whoever closes his side after the last request gets its answer all the same.
+    // Whoever closes his side after the last request gets its answer all the same, and whoever has no place his refusal.
     let rest = async { tokio::join!(carried, written) };
     let _ = timeout(desk.config.patience + HALF_OPEN, rest).await;
 }
@@ -110,6 +110,12 @@ async fn read(
                     drop(place);
                 };
                 tokio::spawn(stopped);
+            } else if place.is_for_stops() {
+                // All others ask: whoever does not stop leaves the place to one who does.
+                let function = frame.pdu.first().copied().unwrap_or_default();
+                let busy = desk.refuse(function, ExceptionCode::ServerDeviceBusy);
+                let _ = answers.send(mbap::frame(transaction, unit, &busy)).await;
+                return Some(Ended::Full);
             } else if queue.try_send(Waiting { transaction, unit, asked }).is_err() {
                 let function = frame.pdu.first().copied().unwrap_or_default();
                 let busy = desk.refuse(function, ExceptionCode::ServerDeviceBusy);

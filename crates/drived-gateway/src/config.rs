@@ -118,8 +118,8 @@ settings! {
     /// who may connect: addresses and networks, such as `["10.0.0.7", "10.1.0.0/16"]`
     allow: Vec<Parsed<Network>> = "everybody",
         |to, said| to.allow = said.iter().map(|network| network.0).collect();
-    /// connections at once, 1 to 256; for one more makes room who has asked nothing the longest, 2 s at least; where nobody has,
-    /// it is closed as it comes, and counted
+    /// connections at once, 1 to 256; for one more makes room who has asked nothing the longest, 2 s at least. Where nobody has,
+    /// 8 more are for stops alone: whatever else is asked there is refused (06h), closed and counted
     clients: usize = "`16`", |to, said| to.clients = within(*said, 1..=256, "")?;
     /// how long a client may ask for nothing
     idle: Parsed<Time> = "`\"60s\"`", |to, said| to.idle = within(said.0.0, SECOND..=DAY, "")?;

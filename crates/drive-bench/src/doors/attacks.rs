@@ -5,6 +5,7 @@
 use std::{
     io::{Read as _, Write as _},
     net::{IpAddr, Ipv4Addr, SocketAddr, TcpStream},
+    path::PathBuf,
     sync::atomic::{AtomicBool, Ordering},
     thread,
     time::Duration,
@@ -12,16 +13,19 @@ use std::{
 
 use socket2::{Domain, Socket, Type};
 
-use super::PATIENCE;
+use super::{PATIENCE, loads::Got};
 
 /// Attackers come from another address than whoever stops: limits are by address.
 const ATTACKER: IpAddr = IpAddr::V4(Ipv4Addr::new(127, 0, 0, 2));
 
 /// Whom it meets.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Target {
     pub(super) http: SocketAddr,
     pub(super) gateway: SocketAddr,
+    pub(super) socket: PathBuf,
+    /// By which somebody may operate.
+    pub(super) token: String,
 }
 
 /// What somebody does until it is over.
@@ -30,10 +34,15 @@ pub(super) struct Attack {
     /// As the command line names it.
     pub(super) key: &'static str,
     pub(super) name: &'static str,
-    pub(super) act: fn(Target, &AtomicBool),
+    /// What it got, where it counts that.
+    pub(super) act: fn(&Target, &AtomicBool) -> Vec<Got>,
 }
 
-const fn attack(key: &'static str, name: &'static str, act: fn(Target, &AtomicBool)) -> Attack {
+pub(super) const fn attack(
+    key: &'static str,
+    name: &'static str,
+    act: fn(&Target, &AtomicBool) -> Vec<Got>,
+) -> Attack {
     Attack { key, name, act }
 }
 
@@ -41,10 +50,10 @@ pub(super) const ATTACKS: [Attack; 8] = [
     attack("calm", "nobody does anything", |_, over| wait(over)),
     attack("silent", "512 connections that say nothing", |to, over| hold(to.http, 512, b"", over)),
     attack("half-heads", "512 half-sent heads", |to, over| {
-        hold(to.http, 512, b"POST /api/v1/stop HTTP/1.1\r\nHost: loc", over);
+        hold(to.http, 512, b"POST /api/v1/stop HTTP/1.1\r\nHost: loc", over)
     }),
     attack("slow-logins", "64 slow bodies of logins", |to, over| {
-        hold(to.http, 64, b"POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 60000\r\n\r\n{", over);
+        hold(to.http, 64, b"POST /api/v1/login HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 60000\r\n\r\n{", over)
     }),
     attack("wrong-tokens", "8 who try tokens on stops", |to, over| {
         flood(
@@ -52,7 +61,7 @@ pub(super) const ATTACKS: [Attack; 8] = [
             8,
             "POST /api/v1/stop?wait=0 HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer drv_wrong\r\nContent-Type: application/json\r\nContent-Length: 2\r\n\r\n{}",
             over,
-        );
+        )
     }),
     attack("large-bodies", "8 who send 64 KiB that they may not", |to, over| {
         let body = " ".repeat(65_000);
@@ -60,18 +69,18 @@ pub(super) const ATTACKS: [Attack; 8] = [
             "POST /api/v1/drives/pump%201/start HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n{body}",
             body.len()
         );
-        flood(to.http, 8, &start, over);
+        flood(to.http, 8, &start, over)
     }),
     attack("unread-streams", "256 event streams that nobody reads", |to, over| {
-        hold(to.http, 256, b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n", over);
+        hold(to.http, 256, b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n", over)
     }),
     attack("silent-gateway", "256 silent clients of the gateway", |to, over| {
-        hold(to.gateway, 256, b"", over);
+        hold(to.gateway, 256, b"", over)
     }),
 ];
 
 /// Opens connections, says the same on each and keeps them; those that are closed are opened again.
-fn hold(to: SocketAddr, count: usize, head: &[u8], over: &AtomicBool) {
+fn hold(to: SocketAddr, count: usize, head: &[u8], over: &AtomicBool) -> Vec<Got> {
     let mut held: Vec<Option<TcpStream>> = (0..count).map(|_| None).collect();
     while !over.load(Ordering::Relaxed) {
         for place in &mut held {
@@ -88,10 +97,11 @@ fn hold(to: SocketAddr, count: usize, head: &[u8], over: &AtomicBool) {
         }
         thread::sleep(Duration::from_millis(10));
     }
+    Vec::new()
 }
 
 /// Asks the same again and again on some connections at once, as fast as it is answered.
-fn flood(to: SocketAddr, count: usize, request: &str, over: &AtomicBool) {
+fn flood(to: SocketAddr, count: usize, request: &str, over: &AtomicBool) -> Vec<Got> {
     thread::scope(|scope| {
         for _ in 0..count {
             scope.spawn(|| {
@@ -108,6 +118,7 @@ fn flood(to: SocketAddr, count: usize, request: &str, over: &AtomicBool) {
             });
         }
     });
+    Vec::new()
 }
 
 fn connect(to: SocketAddr) -> std::io::Result<TcpStream> {
@@ -120,8 +131,9 @@ fn connect(to: SocketAddr) -> std::io::Result<TcpStream> {
     Ok(socket.into())
 }
 
-fn wait(over: &AtomicBool) {
+pub(super) fn wait(over: &AtomicBool) -> Vec<Got> {
     while !over.load(Ordering::Relaxed) {
         thread::sleep(Duration::from_millis(10));
     }
+    Vec::new()
 }

@@ -10,6 +10,7 @@
 
 mod attacks;
 mod browser;
+mod loads;
 mod observer;
 pub(crate) mod plant;
 mod queue;
@@ -25,21 +26,25 @@ use std::{
 };
 
 use clap::Args;
+use drive_sparkplug::{DataType, Metric, Payload, Raw};
 
 use self::{
     attacks::{ATTACKS, Attack, Target},
     browser::Browser,
+    loads::{Got, LOADS, Looking},
     observer::Observer,
-    plant::{DRIVES, Plant, until},
+    plant::{EDGE_NODE, GROUP, PUMP, Plant, Size, until},
     queue::{Act, Whom},
     trivial::Trivial,
 };
 use crate::{
     Error,
     report::{Goal, Report, Unit},
+    usage::{allow_descriptors, memory_of},
 };
 
 const SECTION: &str = "doors";
+const LOADS_SECTION: &str = "loads";
 /// Stops at each door under each attack.
 const STOPS: usize = 100;
 /// What a stop may take until it waits for its line, at p99.
@@ -61,15 +66,20 @@ struct Taken {
 /// Which doors and attacks somebody wants to see; where nothing is named, all.
 #[derive(Debug, Default, Args)]
 pub(crate) struct Wanted {
-    /// Of the doors, stop only at these: pointer, key, http, socket, gateway, mqtt.
+    /// Of the doors, stop only at these: pointer, key, http, socket, gateway, mqtt, sparkplug.
     #[arg(long, value_name = "DOOR", value_parser = DOORS.map(Door::key))]
     door: Vec<String>,
-    /// Of the attacks on doors, only these.
-    #[arg(long, value_name = "ATTACK", value_parser = ATTACKS.map(|attack| attack.key))]
+    /// Of the attacks on doors, or of the loads, only these.
+    #[arg(long, value_name = "ATTACK", value_parser = ATTACKS.iter().chain(&LOADS[1..]).map(|attack| attack.key).collect::<Vec<_>>())]
     attack: Vec<String>,
 }
 
 impl Wanted {
+    /// Those of the doors that somebody wants to see.
+    fn doors(&self, of: &[Door]) -> Vec<Door> {
+        of.iter().copied().filter(|door| Self::has(&self.door, door.key())).collect()
+    }
+
     fn has(of: &[String], key: &str) -> bool {
         of.is_empty() || of.iter().any(|one| one == key)
     }
@@ -78,37 +88,65 @@ impl Wanted {
 /// Measures each door under each attack; and what the machine itself takes: the same attack on a server that does nothing, with stops at
 /// that one, and by the page's button at the daemon, which nobody attacks then.
 pub(crate) fn measure(report: &mut Report, wanted: &Wanted) -> Result<(), Error> {
-    let (plant, trivial) = (Plant::start()?, Trivial::start()?);
-    let wanted_doors: Vec<Door> =
-        DOORS.into_iter().filter(|door| Wanted::has(&wanted.door, door.key())).collect();
-    let is_pressed = wanted_doors.iter().any(|door| matches!(door, Door::Pointer | Door::Key));
-    let mut stopper = Stopper::of(&plant, &trivial, is_pressed)?;
-    let (doors, left_out): (Vec<Door>, Vec<Door>) =
-        wanted_doors.into_iter().partition(|door| stopper.has(*door));
-    for door in left_out {
-        eprintln!("drive-bench: {} is left out: {}", door.name(), door.wants());
-    }
-    for door in &doors {
-        until(|| stopper.stop(*door).is_ok_and(|_| true))?;
-    }
-    let machine = Target { http: trivial.address, gateway: trivial.address };
+    let (plant, trivial) = (Plant::start(Size::SMALL)?, Trivial::start()?);
+    let wanted_doors = wanted.doors(&DOORS);
+    let mut stopper = Stopper::of(&plant, &trivial, &wanted_doors)?;
+    let doors = stopper.those_that_open(wanted_doors)?;
+    let target = plant.target();
+    let machine = Target { http: trivial.address, gateway: trivial.address, ..plant.target() };
     let is_control = |door: &Door| *door == Door::Pointer;
     let controls: Vec<Door> = doors.iter().copied().filter(is_control).chain([Door::Trivial]).collect();
     for attack in ATTACKS.into_iter().filter(|attack| Wanted::has(&wanted.attack, attack.key)) {
         let name = attack.name;
-        under(
-            attack,
-            Target { http: plant.http, gateway: plant.gateway },
-            &doors,
-            &mut stopper,
-            |door, waits| {
-                tell(report, name, door, waits, Goal::AtMost(GOAL_MS));
-            },
-        );
-        let name = format!("{name}, of a server that does nothing");
-        under(attack, machine, &controls, &mut stopper, |door, waits| {
-            tell(report, &name, door, waits, Goal::None);
+        under(attack, &target, &doors, &mut stopper, |door, waits| {
+            tell(report, SECTION, name, door, waits, Goal::AtMost(GOAL_MS));
         });
+        let name = format!("{name}, of a server that does nothing");
+        under(attack, &machine, &controls, &mut stopper, |door, waits| {
+            tell(report, SECTION, &name, door, waits, Goal::None);
+        });
+    }
+    Ok(())
+}
+
+/// Measures each load: its stops beside those under none, what it got, how old statuses were, and what the daemon holds.
+pub(crate) fn measure_loads(report: &mut Report, wanted: &Wanted) -> Result<(), Error> {
+    allow_descriptors()?;
+    let (plant, trivial) = (Plant::start(Size::FULL)?, Trivial::start()?);
+    let wanted_doors = wanted.doors(&LOADED_DOORS);
+    let mut stopper = Stopper::of(&plant, &trivial, &wanted_doors)?;
+    let doors = stopper.those_that_open(wanted_doors)?;
+    let (target, process) = (plant.target(), plant.process.to_string());
+    let period = plant.period()?;
+    let mut calm = Vec::new();
+    let is_wanted = |load: &Attack| load.key == "calm" || Wanted::has(&wanted.attack, load.key);
+    for load in LOADS.into_iter().filter(is_wanted) {
+        let before = memory_of(&process)?;
+        let over = AtomicBool::new(false);
+        let (got, seen) = thread::scope(|scope| {
+            let looks = scope.spawn(|| Looking::at(&target.socket, &over));
+            let got = under(load, &target, &doors, &mut stopper, |door, waits| {
+                let p99 = tell(report, LOADS_SECTION, load.name, door, waits, Goal::AtMost(GOAL_MS));
+                match calm.iter().find(|(of, _)| *of == door) {
+                    None => calm.push((door, p99)),
+                    Some((_, calm)) => {
+                        let what =
+                            format!("{}: a stop by {}, p99 by that beside none", load.name, door.name());
+                        report.note(LOADS_SECTION, what, Unit::Times, p99 / calm);
+                    }
+                }
+            });
+            over.store(true, Ordering::Relaxed);
+            (got, looks.join())
+        });
+        let seen = seen.map_err(|_| "whoever looked has panicked")?;
+        for one in got.into_iter().chain(seen.got(period)) {
+            report.note(LOADS_SECTION, format!("{}: {}", load.name, one.what), one.unit, one.value);
+        }
+        for (when, held) in [("before", before), ("at its end", memory_of(&process)?)] {
+            let what = format!("{}: memory of the daemon {when}", load.name);
+            report.note(LOADS_SECTION, what, Unit::KiB, held as f64);
+        }
     }
     Ok(())
 }
@@ -116,14 +154,14 @@ pub(crate) fn measure(report: &mut Report, wanted: &Wanted) -> Result<(), Error>
 /// Stops at each of these doors while somebody attacks.
 fn under(
     attack: Attack,
-    target: Target,
+    target: &Target,
     doors: &[Door],
     stopper: &mut Stopper<'_>,
     mut tell: impl FnMut(Door, &[Option<Taken>]),
-) {
+) -> Vec<Got> {
     let over = AtomicBool::new(false);
     thread::scope(|scope| {
-        scope.spawn(|| (attack.act)(target, &over));
+        let acts = scope.spawn(|| (attack.act)(target, &over));
         thread::sleep(Duration::from_secs(1));
         for door in doors {
             let (mut all, mut in_vain) = (Vec::with_capacity(STOPS), 0);
@@ -141,10 +179,19 @@ fn under(
             tell(*door, &all);
         }
         over.store(true, Ordering::Relaxed);
-    });
+        acts.join().unwrap_or_default()
+    })
 }
 
-fn tell(report: &mut Report, attack: &str, door: Door, all: &[Option<Taken>], goal: Goal) {
+/// Tells what became of the stops; gives the p99 of their waits, in milliseconds.
+fn tell(
+    report: &mut Report,
+    section: &str,
+    attack: &str,
+    door: Door,
+    all: &[Option<Taken>],
+    goal: Goal,
+) -> f64 {
     // What was not taken is later than everything.
     let sorted = |of: fn(&Taken) -> Option<Duration>| {
         let ms = |taken: &Option<Taken>| {
@@ -164,13 +211,15 @@ fn tell(report: &mut Report, attack: &str, door: Door, all: &[Option<Taken>], go
     let lost = all.iter().filter(|taken| taken.is_none()).count();
     let lost = if lost == 0 { String::new() } else { format!(", {lost} not taken") };
     let answers = match door {
-        Door::Mqtt | Door::Trivial => String::new(),
+        Door::Mqtt | Door::Sparkplug | Door::Trivial => String::new(),
         _ => format!(", answered at p99 after {}", ms(at(&answered, 0.99))),
     };
     let until = if door == Door::Trivial { "until answered" } else { "in the queue of its line" };
     let (door, p50, worst) = (door.name(), ms(at(&queued, 0.5)), ms(at(&queued, 1.0)));
     let what = format!("{attack}: a stop by {door}{answers}; {until}: p50 {p50}, worst {worst}{lost}; p99");
-    report.row(SECTION, what, Unit::Millis, at(&queued, 0.99), goal);
+    let p99 = at(&queued, 0.99);
+    report.row(section, what, Unit::Millis, p99, goal);
+    p99
 }
 
 /// A way by which somebody stops.
@@ -182,11 +231,16 @@ enum Door {
     Socket,
     Gateway,
     Mqtt,
+    Sparkplug,
     /// A server beside the daemon that does nothing.
     Trivial,
 }
 
-const DOORS: [Door; 6] = [Door::Pointer, Door::Key, Door::Http, Door::Socket, Door::Gateway, Door::Mqtt];
+const DOORS: [Door; 7] =
+    [Door::Pointer, Door::Key, Door::Http, Door::Socket, Door::Gateway, Door::Mqtt, Door::Sparkplug];
+
+/// Those at which somebody stops while there is a load: a browser has no processor left then.
+const LOADED_DOORS: [Door; 5] = [Door::Http, Door::Socket, Door::Gateway, Door::Mqtt, Door::Sparkplug];
 
 impl Door {
     /// As the command line names it.
@@ -198,6 +252,7 @@ impl Door {
             Self::Socket => "socket",
             Self::Gateway => "gateway",
             Self::Mqtt => "mqtt",
+            Self::Sparkplug => "sparkplug",
             Self::Trivial => "trivial",
         }
     }
@@ -210,6 +265,7 @@ impl Door {
             Self::Socket => "the socket",
             Self::Gateway => "the gateway",
             Self::Mqtt => "MQTT",
+            Self::Sparkplug => "Sparkplug",
             Self::Trivial => "HTTP there",
         }
     }
@@ -219,7 +275,7 @@ impl Door {
             Self::Pointer | Self::Key => {
                 "it wants /usr/bin/chromium and the Python module playwright (DRIVED_PYTHON)"
             }
-            Self::Mqtt => "it wants mosquitto",
+            Self::Mqtt | Self::Sparkplug => "it wants mosquitto",
             Self::Http | Self::Socket | Self::Gateway | Self::Trivial => "it wants nothing",
         }
     }
@@ -234,7 +290,8 @@ struct Stopper<'a> {
 }
 
 impl<'a> Stopper<'a> {
-    fn of(plant: &'a Plant, trivial: &'a Trivial, is_pressed: bool) -> Result<Self, Error> {
+    fn of(plant: &'a Plant, trivial: &'a Trivial, doors: &[Door]) -> Result<Self, Error> {
+        let is_pressed = doors.iter().any(|door| matches!(door, Door::Pointer | Door::Key));
         let browser = match is_pressed {
             true => Browser::start(&format!("http://{}/", plant.http))?,
             false => None,
@@ -242,10 +299,22 @@ impl<'a> Stopper<'a> {
         Ok(Self { plant, trivial, browser, observer: Observer::start(&plant.socket)? })
     }
 
+    /// Those of the doors that are there, once a stop by each was taken.
+    fn those_that_open(&mut self, doors: Vec<Door>) -> Result<Vec<Door>, Error> {
+        let (doors, left_out): (Vec<Door>, Vec<Door>) = doors.into_iter().partition(|door| self.has(*door));
+        for door in left_out {
+            eprintln!("drive-bench: {} is left out: {}", door.name(), door.wants());
+        }
+        for door in &doors {
+            until(|| self.stop(*door).is_ok_and(|_| true))?;
+        }
+        Ok(doors)
+    }
+
     const fn has(&self, door: Door) -> bool {
         match door {
             Door::Pointer | Door::Key => self.browser.is_some(),
-            Door::Mqtt => self.plant.broker.is_some(),
+            Door::Mqtt | Door::Sparkplug => self.plant.broker.is_some(),
             Door::Http | Door::Socket | Door::Gateway | Door::Trivial => true,
         }
     }
@@ -261,7 +330,8 @@ impl<'a> Stopper<'a> {
         self.observer.catch_up();
         self.plant.queue.forget();
         let (act, answered) = self.act(door)?;
-        let whom = if door == Door::Gateway { Whom::One(1) } else { Whom::All(&DRIVES) };
+        let all: Vec<u8> = (1..=self.plant.size.commanded).collect();
+        let whom = if door == Door::Gateway { Whom::One(1) } else { Whom::All(&all) };
         let queued = self.plant.queue.had(whom, act)?;
         self.observer.has_settled_another()?;
         Ok(Taken { queued, answered })
@@ -291,7 +361,14 @@ impl<'a> Stopper<'a> {
             }
             Door::Mqtt => {
                 let broker = self.plant.broker.ok_or(ErrorKind::NotFound)?;
-                let _connection = publish(connected(broker)?, "drived/all/stop")?;
+                let _connection = publish(connected(broker)?, &[("drived/all/stop".to_owned(), Vec::new())])?;
+                return Ok((act, None));
+            }
+            Door::Sparkplug => {
+                let broker = self.plant.broker.ok_or(ErrorKind::NotFound)?;
+                let all: Vec<_> =
+                    (1..=self.plant.size.commanded).map(|slave| stop_of_a_host(slave, act)).collect();
+                let _connection = publish(connected(broker)?, &all)?;
                 return Ok((act, None));
             }
             Door::Trivial | Door::Pointer | Door::Key => return Err(ErrorKind::NotFound.into()),
@@ -321,8 +398,21 @@ fn ask_http(mut stream: impl std::io::Read + std::io::Write) -> std::io::Result<
     }
 }
 
-/// Publishes nothing on a topic as a client of MQTT 5.0 does that has just come, and keeps the connection.
-fn publish(mut stream: TcpStream, topic: &str) -> std::io::Result<TcpStream> {
+/// What a host of Sparkplug publishes to stop a drive, and where.
+fn stop_of_a_host(slave: u8, now: Act) -> (String, Vec<u8>) {
+    let topic = format!("spBv1.0/{GROUP}/DCMD/{EDGE_NODE}/{PUMP} {slave}");
+    let metric = Metric {
+        name: Some("Control/Command".to_owned()),
+        data_type: Some(DataType::String.code()),
+        value: Some(Raw::String("stop".to_owned())),
+        ..Metric::default()
+    };
+    let payload = Payload { timestamp: Some(now.0 as u64), metrics: vec![metric], ..Payload::default() };
+    (topic, payload.encode())
+}
+
+/// Publishes these payloads on their topics as a client of MQTT 5.0 does that has just come, and keeps the connection.
+fn publish(mut stream: TcpStream, all: &[(String, Vec<u8>)]) -> std::io::Result<TcpStream> {
     // CONNECT (3.1): "MQTT", version 5, a clean start, 60 s, no properties, a client id that the broker makes.
     stream.write_all(&[0x10, 13, 0, 4, b'M', b'Q', b'T', b'T', 5, 0x02, 0, 60, 0, 0, 0])?;
     // CONNACK (3.2), with properties.
@@ -333,9 +423,18 @@ fn publish(mut stream: TcpStream, topic: &str) -> std::io::Result<TcpStream> {
     if head[0] != 0x20 || rest.get(1) != Some(&0) {
         return Err(IoError::other("the broker refuses"));
     }
-    // PUBLISH (3.3) at most once, without properties and payload.
-    let length = u8::try_from(topic.len()).map_err(IoError::other)?;
-    let packet = [&[0x30, length + 3, 0, length], topic.as_bytes(), &[0]].concat();
-    stream.write_all(&packet)?;
+    // PUBLISH (3.3) at most once, without properties; none of them is longer than one byte of length says.
+    let mut packets = Vec::new();
+    for (topic, payload) in all {
+        let length = u8::try_from(3 + topic.len() + payload.len()).map_err(IoError::other)?;
+        if length > 127 {
+            return Err(IoError::other("what is published is too long"));
+        }
+        packets.extend([0x30, length, 0, topic.len() as u8]);
+        packets.extend(topic.as_bytes());
+        packets.push(0);
+        packets.extend(payload);
+    }
+    stream.write_all(&packets)?;
     Ok(stream)
 }

@@ -6,8 +6,10 @@ use std::{
     env,
     ffi::OsString,
     fs,
+    io::{Read as _, Write as _},
     net::{SocketAddr, TcpListener, TcpStream},
-    os::unix::process::CommandExt as _,
+    ops::RangeInclusive,
+    os::unix::{net::UnixStream, process::CommandExt as _},
     path::{Path, PathBuf},
     process::{Child, ChildStderr, Command, Stdio},
     sync::atomic::{AtomicU32, Ordering},
@@ -15,15 +17,39 @@ use std::{
     time::{Duration, Instant},
 };
 
-use rustix::process::{Signal, set_parent_process_death_signal};
+use rustix::process::{Pid, Signal, set_parent_process_death_signal, setpriority_process};
 
-use super::queue::Queue;
+use super::{attacks::Target, queue::Queue};
 use crate::Error;
 
-/// The addresses of its drives: two, so that each stop is soon over.
-pub(super) const DRIVES: [u8; 2] = [1, 2];
+/// What is behind the doors.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Size {
+    /// So many drives can be commanded: few, so that each stop is soon over.
+    pub(super) commanded: u8,
+    /// So many are watched besides, on the same line.
+    pub(super) watched: u8,
+    /// So many clients the gateway lets in.
+    pub(super) clients: u16,
+    writes: &'static str,
+}
 
-const FAMILY: &str = "atv312@1-2";
+impl Size {
+    /// For attacks on the doors.
+    pub(super) const SMALL: Self = Self { commanded: 2, watched: 0, clients: 16, writes: "stop" };
+    /// For loads: a line that is full of polls.
+    pub(super) const FULL: Self = Self { commanded: 5, watched: 26, clients: 256, writes: "operate" };
+
+    pub(super) const fn drives(self) -> u8 {
+        self.commanded + self.watched
+    }
+}
+
+/// The group and the edge node as which it is known to hosts of Sparkplug.
+pub(super) const GROUP: &str = "bench";
+pub(super) const EDGE_NODE: &str = "bench";
+/// Drives that can be commanded are called so, with their address behind.
+pub(super) const PUMP: &str = "pump";
 
 /// A daemon with simulated drives and all its doors, in a folder of its own.
 pub(super) struct Plant {
@@ -34,36 +60,96 @@ pub(super) struct Plant {
     /// `None` where there is no mosquitto.
     pub(super) broker: Option<SocketAddr>,
     pub(super) queue: Queue,
+    pub(super) size: Size,
+    /// By which somebody may operate.
+    pub(super) token: String,
+    /// The number of the daemon's process.
+    pub(super) process: u32,
     _running: Vec<Running>,
 }
 
 impl Plant {
-    pub(super) fn start() -> Result<Self, Error> {
+    /// Whom an attack meets.
+    pub(super) fn target(&self) -> Target {
+        let (socket, token) = (self.socket.clone(), self.token.clone());
+        Target { http: self.http, gateway: self.gateway, socket, token }
+    }
+
+    /// How often a drive at rest is asked.
+    pub(super) fn period(&self) -> Result<Duration, Error> {
+        let mut stream = UnixStream::connect(&self.socket)?;
+        let head =
+            "GET /api/v1/drives/pump%201/settings HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+        stream.write_all(head.as_bytes())?;
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer)?;
+        let (_, body) = answer.split_once("\r\n\r\n").ok_or("no answer")?;
+        let settings: serde_json::Value = serde_json::from_str(body)?;
+        let ms = settings.pointer("/settings/periods/rest_ms").and_then(serde_json::Value::as_u64);
+        Ok(Duration::from_millis(ms.ok_or("the daemon does not tell its periods")?))
+    }
+
+    pub(super) fn start(size: Size) -> Result<Self, Error> {
         let (program, folder) = (program()?, Folder::new()?);
         let (link, socket) = (folder.0.join("line"), folder.0.join("drived.sock"));
         let (http, gateway, broker) = (free()?, free()?, free()?);
         let mosquitto = mosquitto(&folder.0.join("mosquitto.conf"), broker)?;
         let mqtt = match mosquitto {
-            Some(_) => format!("[mqtt]\nservers = [\"mqtt://{broker}\"]\ncommands = true\n"),
+            Some(_) => format!(
+                "[mqtt]\nservers = [\"mqtt://{broker}\"]\ncommands = true\n\
+                 [mqtt.sparkplug]\ngroup = \"{GROUP}\"\nedge_node = \"{EDGE_NODE}\"\ncommands = \"stop\"\n"
+            ),
             None => String::new(),
         };
         let config = folder.0.join("drives.toml");
+        let Size { commanded, clients, writes, .. } = size;
+        let drives = |numbers: RangeInclusive<u8>, name: &str, control: bool| {
+            let (first, last) = (numbers.start(), numbers.end());
+            format!(
+                "[[drives]]\nline = \"bench\"\ndrive = \"atv312@{first}-{last}\"\nname = \"{name} {{}}\"\ncontrol = {control}\n"
+            )
+        };
+        let watched = match size.watched {
+            0 => String::new(),
+            _ => drives(commanded + 1..=size.drives(), "fan", false),
+        };
         fs::write(
             &config,
             format!(
-                "[http]\nlisten = \"{http}\"\n[socket]\npath = {socket:?}\n{mqtt}[lines.bench]\nport = {link:?}\n\
-                 [[drives]]\nline = \"bench\"\ndrive = \"{FAMILY}\"\nname = \"pump {{}}\"\ncontrol = true\n\
-                 [[gateways]]\nlisten = \"{gateway}\"\nline = \"bench\"\nwrites = \"stop\"\n"
+                "state = {:?}\n[http]\nlisten = \"{http}\"\n[socket]\npath = {socket:?}\n{mqtt}[lines.bench]\nport = {link:?}\n\
+                 {}{watched}\
+                 [[gateways]]\nlisten = \"{gateway}\"\nline = \"bench\"\nclients = {clients}\nwrites = \"{writes}\"\n",
+                folder.0.join("state"),
+                drives(1..=commanded, PUMP, true),
             ),
         )?;
-        let drives = ["sim", "--drive", FAMILY, "--pty", text(&link)?];
+        let token = Command::new(&program)
+            .args(["token", "add", "bench", "--role", "operate", "--config", text(&config)?])
+            .output()?;
+        let token = String::from_utf8(token.stdout)?.trim().to_owned();
+        let all = format!("atv312@1-{}", size.drives());
+        let drives = ["sim", "--drive", &all, "--pty", text(&link)?];
         let drives = Running::start(&program, &drives)?;
+        drives.goes_first();
         until(|| link.exists())?;
         let (daemon, log) = Running::start_heard(&program, &["run", "--config", text(&config)?])?;
         until(|| socket.exists() && TcpStream::connect(http).is_ok() && TcpStream::connect(gateway).is_ok())?;
         let broker = mosquitto.is_some().then_some(broker);
+        let process = daemon.0.id();
         let running = [drives, daemon].into_iter().chain(mosquitto).collect();
-        Ok(Self { _folder: folder, http, gateway, socket, broker, queue: Queue::of(log), _running: running })
+        let queue = Queue::of(log);
+        Ok(Self {
+            _folder: folder,
+            http,
+            gateway,
+            socket,
+            broker,
+            queue,
+            size,
+            token,
+            process,
+            _running: running,
+        })
     }
 }
 
@@ -104,6 +190,12 @@ pub(crate) fn become_one_that_ends_with_me(program: &[OsString]) -> Error {
 impl Running {
     pub(crate) fn start(program: &Path, arguments: &[&str]) -> Result<Self, Error> {
         Ok(Self(Self::command(program, arguments)?.spawn()?))
+    }
+
+    /// Real drives wait for no processor of this machine: these go first, where somebody may say so.
+    fn goes_first(&self) {
+        let process = i32::try_from(self.0.id()).ok().and_then(Pid::from_raw);
+        let _ = setpriority_process(process, -10);
     }
 
     /// The same, with its log, in which each stop stands that is in the queue of its line.

@@ -84,9 +84,13 @@ impl Peer {
     }
 
     fn at(desk: &Arc<Desk>, address: IpAddr) -> Self {
+        Self::in_place(desk, address, place(address))
+    }
+
+    fn in_place(desk: &Arc<Desk>, address: IpAddr, place: Place) -> Self {
         let (stream, theirs) = tokio::io::duplex(4_096);
         let desk = Arc::clone(desk);
-        tokio::spawn(async move { client::serve(theirs, address, desk, &place(address)).await });
+        tokio::spawn(async move { client::serve(theirs, address, desk, &place).await });
         Self { stream, sent: BTreeMap::new(), next: 0x1501 }
     }
 

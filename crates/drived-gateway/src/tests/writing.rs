@@ -1,6 +1,6 @@
 //! Writes that would move a motor, and those that would not.
 
-use std::{sync::Arc, time::Duration};
+use std::{net::IpAddr, sync::Arc, time::Duration};
 
 use drive_core::{Direction, Frequency, StopMode};
 use drive_fleet::{EventKind, Received};
@@ -8,7 +8,10 @@ use tokio::time::{Instant, sleep, timeout};
 
 use super::{ETA, Peer, plant, read};
 use crate::{config::GatewayConfig, desk::Desk};
-use drived_doors::{Caller, Rights, Role};
+use drived_doors::{
+    Caller, Rights, Role,
+    crowd::{Crowd, Limits},
+};
 use drived_plant::plant::{
     commands::{Action, Request, Target},
     testing::TestPlant,
@@ -247,6 +250,30 @@ async fn a_stop_waits_for_no_queue_and_no_share_and_no_start_comes_after_it() {
     }
     assert!(answers.len() < 7, "ahead of reads that were sent before it: {answers:?}");
     sleep(Duration::from_secs(20)).await;
+    assert!(!plant.machines[0].observe().running);
+}
+
+#[tokio::test(start_paused = true)]
+async fn where_all_clients_ask_a_newcomer_finds_a_place_for_a_stop_and_for_nothing_else() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let crowd = Crowd::new(Limits::of_gateway(1));
+    let enter = |number: u8| {
+        let address = IpAddr::from([10, 0, 0, number]);
+        let place = crowd.enter(Some(address), Instant::now()).expect("a place for a stop");
+        Peer::in_place(&desk, address, place)
+    };
+    let mut scada = enter(1);
+    climb(&mut scada, 1).await;
+    assert_eq!(scada.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+    assert!(plant.machines[0].observe().running);
+    let mut reader = enter(2);
+    assert_eq!(reader.ask(1, &read(ETA, 1)).await, [0x83, 0x06]);
+    assert!(reader.is_ended().await, "whoever does not stop keeps the place from nobody");
+    let mut starter = enter(3);
+    assert_eq!(starter.ask(1, &write(LFR, 300)).await, [0x86, 0x06]);
+    assert!(starter.is_ended().await);
+    let mut panel = enter(4);
+    assert_eq!(panel.ask(1, &write(CMD, 0x0000)).await, write(CMD, 0x0000));
     assert!(!plant.machines[0].observe().running);
 }
 

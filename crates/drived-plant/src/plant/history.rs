@@ -3,7 +3,7 @@
 //! Four numbers each half second: 1 200 × 16 bytes, 19 KiB a drive.
 
 use std::{
-    collections::{BTreeMap, VecDeque},
+    collections::{BTreeMap, HashSet, VecDeque},
     sync::{Arc, Mutex, PoisonError, Weak},
     time::Duration,
 };
@@ -87,7 +87,8 @@ impl History {
         let now = Instant::now();
         let mut rings = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         push(&mut rings.times, now);
-        rings.drives.retain(|name, _| drives.iter().any(|drive| drive.name() == name));
+        let there: HashSet<&Arc<str>> = drives.iter().map(DriveHandle::name).collect();
+        rings.drives.retain(|name, _| there.contains(name));
         let known = rings.times.len();
         for drive in drives {
             let ring = rings.drives.entry(Arc::clone(drive.name())).or_default();

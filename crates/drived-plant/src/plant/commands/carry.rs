@@ -2,6 +2,7 @@
 
 use std::{
     borrow::Cow,
+    collections::HashMap,
     sync::{Arc, Mutex, PoisonError},
     time::Duration,
 };
@@ -42,6 +43,8 @@ struct Inner {
     plant: Plant,
     request: Request,
     members: Vec<DriveHandle>,
+    /// Where each stands among them, by his name.
+    numbers: HashMap<Arc<str>, usize>,
     /// What is told of each member, in their order.
     parts: Mutex<Vec<CommandView>>,
     /// One of them has changed.
@@ -104,7 +107,8 @@ impl Work {
             Target::Drive(_) | Target::All => head,
         };
         let request = request.clone();
-        Self(Arc::new(Inner { plant, request, members, parts, changed: Notify::new(), head }))
+        let numbers = members.iter().map(|member| Arc::clone(member.name())).zip(0..).collect();
+        Self(Arc::new(Inner { plant, request, members, numbers, parts, changed: Notify::new(), head }))
     }
 
     /// The command as it is to be told now.
@@ -115,7 +119,8 @@ impl Work {
         }
         let outcome = of_all(parts.iter().map(|part| (part.outcome, part.reason.as_deref())));
         let silent = |part: &CommandView| {
-            let member = self.0.members.iter().find(|member| part.drive.as_deref() == Some(member.name()));
+            let number = part.drive.as_deref().and_then(|drive| self.0.numbers.get(drive));
+            let member = number.and_then(|number| self.0.members.get(*number));
             member.is_some_and(|member| member.snapshot().link != Link::Connected)
         };
         CommandView {
@@ -264,8 +269,8 @@ impl Work {
     }
 
     fn end_of(&self, name: &str, outcome: &Outcome) {
-        if let Some(number) = self.0.members.iter().position(|member| **member.name() == *name) {
-            self.end(number, outcome);
+        if let Some(number) = self.0.numbers.get(name) {
+            self.end(*number, outcome);
         }
     }
 
