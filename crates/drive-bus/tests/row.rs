@@ -179,6 +179,8 @@ async fn a_row_that_says_what_it_said_and_one_that_says_something_new_are_asked_
 async fn a_read_that_says_once_more_what_another_did_is_told() {
     let (_line, mut slave, far_end) = line(&RUNS);
     assert_eq!(wrong_in_a_row(&mut slave, &RUNS).await, []);
+    // What was still to come has come.
+    sleep(1_100 * MS).await;
     let once = far_end.lock().unwrap().asked;
     // The output reaches what the reference is.
     far_end.lock().unwrap().words.insert(0xFD00, 4_998);
