@@ -19,6 +19,8 @@ use super::{
 
 /// How long a connection may ask for nothing.
 const HEAD_WITHIN: Duration = Duration::from_secs(5);
+/// For how long one that nobody has heard yet is listened to when others want its place.
+const MOMENT: Duration = Duration::from_millis(200);
 /// The most that the head of a request may be.
 const HEAD: usize = 16 * 1024;
 const HEADERS: usize = 64;
@@ -56,10 +58,60 @@ pub(super) async fn serve<S, F>(
         () = place.wanted() => true,
         _ = end.wait_for(|ended| *ended) => false,
     };
+    // On a busy machine nobody has said yet what has come: among a thousand who come at once a stop would be closed before it was read.
+    if makes_room
+        && place.heads() == 0
+        && let Some(_moment) = place.moment()
+        && timeout(MOMENT, connection.as_mut()).await.is_ok()
+    {
+        return;
+    }
     connection.as_mut().graceful_shutdown();
     // Whoever has asked whole by now is answered; who has not makes room at once.
     if makes_room && (connection.as_mut().now_or_never().is_some() || !place.asks()) {
         return;
     }
     let _ = timeout(DRAINED_WITHIN, connection).await;
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::IpAddr;
+
+    use tokio::{
+        io::{AsyncReadExt as _, AsyncWriteExt as _, duplex},
+        task::yield_now,
+        time::{Instant, sleep},
+    };
+
+    use super::*;
+    use crate::crowd::{Crowd, Limits};
+
+    /// What somebody is answered whose place is wanted before anybody has heard what he asks.
+    async fn answer_beside_others(moments: usize) -> String {
+        let crowd = Crowd::new(Limits { connections: 1, for_stops: 0, moments, ..Limits::HTTP });
+        let enter = |number| crowd.enter(Some(IpAddr::from([10, 0, 0, number])), Instant::now());
+        let (mut far, near) = duplex(4_096);
+        let (_end, ended) = watch::channel(false);
+        let answer = |_, asking: Asking| async move {
+            asking.is_whole();
+            Response::new(Body::empty())
+        };
+        let served = tokio::spawn(serve(near, enter(1).unwrap(), ended, answer));
+        yield_now().await;
+        let _other = enter(2).expect("who has asked nothing makes room");
+        sleep(MOMENT / 4).await;
+        let _ = far.write_all(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n").await;
+        let mut said = String::new();
+        let _ = far.read_to_string(&mut said).await;
+        served.await.unwrap();
+        said
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn who_has_to_make_room_is_answered_where_what_he_asks_is_heard_a_moment_later() {
+        let answered = answer_beside_others(1).await;
+        assert!(answered.starts_with("HTTP/1.1 200"), "{answered}");
+        assert_eq!(answer_beside_others(0).await, "", "not so many that they take all there is");
+    }
 }

@@ -13,7 +13,10 @@ use std::{
     time::Duration,
 };
 
-use tokio::{sync::Notify, time::Instant};
+use tokio::{
+    sync::{Notify, OwnedSemaphorePermit, Semaphore},
+    time::Instant,
+};
 
 /// How many may come through a door.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,6 +30,8 @@ pub struct Limits {
     /// Who has said nothing for so long makes room. Who has never said anything makes room at once for an address that has fewer
     /// connections than his.
     pub silent_for: Duration,
+    /// So many that have to make room may be heard for a moment longer at once.
+    pub moments: usize,
     /// Event streams at once: what is left of the connections is for commands.
     pub streams: usize,
     /// Event streams of one address.
@@ -40,6 +45,7 @@ impl Limits {
         per_address: 64,
         for_stops: 16,
         silent_for: Duration::ZERO,
+        moments: 64,
         streams: 32,
         streams_per_address: 32,
     };
@@ -56,6 +62,7 @@ impl Limits {
 #[derive(Debug, Clone)]
 pub struct Crowd {
     members: Arc<Mutex<Members>>,
+    moments: Arc<Semaphore>,
     limits: Limits,
 }
 
@@ -126,7 +133,7 @@ impl Member {
 
 impl Crowd {
     pub fn new(limits: Limits) -> Self {
-        Self { members: Arc::default(), limits }
+        Self { members: Arc::default(), moments: Arc::new(Semaphore::new(limits.moments)), limits }
     }
 
     /// A place for a connection, if there is room or somebody to make room.
@@ -198,6 +205,11 @@ impl Place {
     /// Waits until somebody else needs the place. Safe to drop.
     pub async fn wanted(&self) {
         self.shared.leave.notified().await;
+    }
+
+    /// For whoever has to make room: a moment in which what he has sent is still heard, as long as not too many have one.
+    pub(super) fn moment(&self) -> Option<OwnedSemaphorePermit> {
+        Arc::clone(&self.crowd.moments).try_acquire_owned().ok()
     }
 
     /// Whether it is for stops alone.
