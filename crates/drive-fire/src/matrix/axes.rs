@@ -189,7 +189,7 @@ impl FarEnd {
             Self::SecondMaster if struck => Some(Untold::value(
                 "the answer to a second master is struck, of which nobody knows any more whose it is",
             )),
-            Self::MasterHeardInAnswers => Some(Untold::value(
+            Self::MasterHeardInAnswers => Some(Untold::answer_to_another(
                 "an answer to a second master that is not heard itself comes while one of this length is waited for",
             )),
             _ => None,

@@ -146,7 +146,12 @@ impl Cell {
         let of_far_end = self.far_end.untold(self.way, self.fault != Fault::None);
         let fast = self.far_end == FarEnd::Fast;
         let deaf = self.fault.in_front_of(self.event.deafens()).untold(self.way, fast);
-        of_far_end.into_iter().chain(self.fault.untold(self.way, fast)).chain(deaf)
+        let collides = self.far_end == FarEnd::MasterHeardInAnswers && matches!(self.fault, Fault::Double(_));
+        let lost = collides.then_some(Untold::confirmation(
+            "the second of two confirmations of one write, while the next is lost to a question that is not heard",
+        ));
+        let of_the_wire = self.fault.untold(self.way, fast);
+        of_far_end.into_iter().chain(of_the_wire).chain(deaf).chain(lost)
     }
 
     /// Why it cannot exist, or is another one; `None`: it can.

@@ -23,6 +23,8 @@ enum Taken {
     Answer,
     /// Nothing that was made up on the way: somebody says himself what is not so.
     OwnWords,
+    /// A value of a read, which was made up on the way, or the drive's answer to somebody else.
+    AnswerToAnother,
     /// Anything.
     Anything,
 }
@@ -56,6 +58,11 @@ impl Untold {
         Self { why, taken: Taken::OwnWords }
     }
 
+    /// A value that the drive gave to somebody else, and what follows from it.
+    pub(super) const fn answer_to_another(why: &'static str) -> Self {
+        Self { why, taken: Taken::AnswerToAnother }
+    }
+
     /// Whatever is said.
     pub(super) const fn anything(why: &'static str) -> Self {
         Self { why, taken: Taken::Anything }
@@ -69,6 +76,7 @@ impl Untold {
             Taken::Confirmation => confirmation && !value,
             Taken::Answer => value || confirmation,
             Taken::OwnWords => !value && !confirmation,
+            Taken::AnswerToAnother => !confirmation,
             Taken::Anything => true,
         }
     }
