@@ -173,13 +173,13 @@ impl<P: Port> Drivecom for Atv58<P> {
         self.read_held(Class::Command).await.map(|(held, _)| held)
     }
 
-    /// "Disable voltage" for a drive that has left "operation enabled", such as a tripped one: it moves nothing there. For one that
-    /// has not, the manual names no word that ends a run command and nothing else.
+    /// "Disable voltage" for a drive that has left "operation enabled", such as a tripped one, or that has no output, whoever commands it: it
+    /// moves nothing there. For a motor that turns, the manual names no word that ends a run command and nothing else.
     fn withdrawal(&self, _: u16, status: &Status) -> std::result::Result<u16, &'static str> {
         let turns = status.output_frequency.is_none_or(|output| output != Frequency::ZERO);
         match status.raw(self.map.status).and_then(ChartState::of) {
             Some(ChartState::Fault) => Ok(drivecom::DISABLE_VOLTAGE),
-            None | Some(ChartState::OperationEnabled | ChartState::FaultReactionActive) => Err(NO_WITHDRAWAL),
+            None | Some(ChartState::FaultReactionActive) => Err(NO_WITHDRAWAL),
             Some(_) if turns => Err(NO_WITHDRAWAL),
             Some(_) => Ok(drivecom::DISABLE_VOLTAGE),
         }

@@ -245,3 +245,15 @@ async fn a_stop_of_this_side_is_told_as_nobody_elses_while_the_motor_comes_down(
         assert!(!matches!(verdict, Some(Verdict::NotInForce { .. })), "{verdict:?}");
     }
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_run_command_is_withdrawn_where_the_motor_has_no_output_whoever_keeps_it_from_acting() {
+    // The fast stop of an input leaves "operation enabled"; forced local mode is bit 9 of ETA at 0.
+    for (eta, output, is_withdrawn) in [(0x0627, 0, true), (0x0427, 0, true), (0x0427, 300, false)] {
+        let mut drive = leased(&[(458, eta), (450, 0), (451, output)], Atv58Map::default());
+        drive.status().await.unwrap();
+        assert_eq!(drive.withdraw().await.is_ok(), is_withdrawn, "{eta:#06x} {output}");
+        let written: &[(u16, u16)] = if is_withdrawn { &[(CMD, 0)] } else { &[] };
+        assert_eq!(drive.into_port().written(), written);
+    }
+}

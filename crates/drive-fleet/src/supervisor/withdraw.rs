@@ -30,8 +30,9 @@ const fn by(lacks: Lack) -> Policy {
 #[derive(Debug)]
 pub(super) struct Withdrawal {
     asker: Asker,
-    /// When it is tried next; `None` where the family cannot.
+    /// When it is tried next; `None` where the family cannot, with what the shaft did then: of one that stands it may be able to.
     next_try: Option<Instant>,
+    lacked: Option<Motion>,
     pause: Duration,
     /// When it becomes an alarm that it still stands; `None` when it has.
     alarm_at: Option<Instant>,
@@ -130,8 +131,20 @@ impl Supervisor {
         {
             let asker = Asker::Policy(policy);
             let alarm_at = Some(now + self.settings.times.stop_alarm);
-            self.withdrawal =
-                Some(Withdrawal { asker, next_try: Some(now), pause: REPEAT.0, alarm_at, stands: None });
+            self.withdrawal = Some(Withdrawal {
+                asker,
+                next_try: Some(now),
+                lacked: None,
+                pause: REPEAT.0,
+                alarm_at,
+                stands: None,
+            });
+        }
+        let motion = self.status.as_ref().map(|status| status.value.motion);
+        if let Some(withdrawal) =
+            self.withdrawal.as_mut().filter(|it| it.lacked.is_some() && it.lacked != motion)
+        {
+            (withdrawal.next_try, withdrawal.lacked) = (Some(now), None);
         }
     }
 
@@ -164,6 +177,7 @@ impl Supervisor {
             Err(error) => {
                 let lacks = error.kind() == ErrorKind::Unsupported;
                 withdrawal.next_try = (!lacks).then_some(now + withdrawal.pause);
+                withdrawal.lacked = self.status.as_ref().map(|status| status.value.motion).filter(|_| lacks);
                 withdrawal.pause = (withdrawal.pause * 2).min(REPEAT.1);
                 let alarm = withdrawal.alarm_at.take_if(|at| lacks || *at <= now).is_some();
                 if withdrawal.alarm_at.is_none() {
