@@ -209,6 +209,20 @@ async fn a_current_above_its_alarm_is_told_and_told_when_it_is_back() {
     plant.event("enough", |kind| matches!(kind, EventKind::Limit { exceeded: false, .. })).await;
 }
 
+/// The limits of a fleet may be lowered under a motor that runs, and another master may give it a reference.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_runs_above_the_limit_of_its_setpoints_is_told_whoever_made_it() {
+    let mut plant = Plant::single(Family::ATV312, |settings| {
+        settings.limits.high = Some(Frequency::from_hertz(35));
+        settings.on_control_taken = drive_fleet::OnControlTaken::Report;
+    });
+    plant.run_at(30).await;
+    plant.machine().written_by_another(8_502, 480).expect("LFr is written");
+    let told = plant.event("above", |kind| matches!(kind, EventKind::Limit { exceeded: true, .. })).await;
+    let EventKind::Limit { limit: Limit::Frequency { measured, limit }, .. } = told else { panic!("{told}") };
+    assert!(limit == Frequency::from_hertz(35) && measured > limit, "{told}");
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_panel_that_takes_a_running_drive_is_told() {
     let mut plant = Plant::single(Family::ATV312, |_| {});

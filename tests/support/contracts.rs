@@ -76,7 +76,8 @@ fn control(family: Family) -> (ControlWord, &'static [u16]) {
         // §5.1: run, reverse, and a pulse of the inputs of n06 to n08.
         Five::Omron3g3ev => {
             let words = &[0x0000, 0x0001, 0x0003, 0x0010, 0x0020, 0x0040];
-            let plausible = &[0x0004, 0x0005, 0x0142, 0x0041, 0x0065, 0, 0, 0, 1, 5, drives::RESET_FUNCTION];
+            let plausible =
+                &[0x0004, 0x0005, 0x0142, 0x0041, 0x0065, 0, 0, 0, 0, 0, 1, 5, drives::RESET_FUNCTION];
             (ControlWord { others: |_| 0x0070, ..control(0x0001, words) }, plausible)
         }
     }

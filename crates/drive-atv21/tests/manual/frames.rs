@@ -255,8 +255,16 @@ async fn a_setpoint_of_60_hertz_is_the_write_of_7_6_and_one_of_80_that_of_8_5() 
         if first {
             script.push(("01 03 FA01 0001", "01 03 02 0000"));
         }
-        script.extend([write, ("01 03 FA01 0001", word), ("01 03 FE46 0001", "01 03 02 0004")]);
+        script.extend([write, ("01 03 FA01 0001", word)]);
+        if !first {
+            // 0012h has just said the same: it is asked twice, and so is FE02 behind it.
+            script.push(("01 03 FA01 0001", word));
+        }
+        script.push(("01 03 FE46 0001", "01 03 02 0004"));
         script.push(("01 03 FE02 0001", word));
+        if !first {
+            script.push(("01 03 FE02 0001", word));
+        }
         script
     };
     let script = [
@@ -353,6 +361,8 @@ async fn command_words_are_those_of_8_4_with_and_without_the_priorities() {
             ("01 03 FE46 0001", "01 03 02 0004"),
             ("01 03 FE02 0001", "01 03 02 1770"),
             ("01 03 FA01 0001", "01 03 02 1770"),
+            // Others of these words have said the same as each other: what is new behind them is asked twice.
+            ("01 03 FA00 0001", &held),
             ("01 03 FA00 0001", &held),
         ]);
         let (line, other_end) = scripted(&script);

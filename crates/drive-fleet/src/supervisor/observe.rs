@@ -128,6 +128,14 @@ impl Supervisor {
                 .zip(limit)
                 .map(|(measured, limit)| (Limit::Current { measured, limit }, measured > limit))
         });
+        self.check_limit("frequency", {
+            let limit = self.settings.limits.high;
+            status
+                .value
+                .output_frequency
+                .zip(limit)
+                .map(|(measured, limit)| Limit::of_frequency(measured, limit))
+        });
         if was == Link::Lost
             && self.settings.control
             && let OnLoss::Stop(mode) = self.settings.on_loss

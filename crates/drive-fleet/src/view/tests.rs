@@ -308,6 +308,10 @@ fn every_kind() -> Vec<EventKind> {
             exceeded: true,
         },
         EventKind::Limit {
+            limit: Limit::Frequency { measured: Frequency::from_hertz(30), limit: Frequency::from_hertz(20) },
+            exceeded: true,
+        },
+        EventKind::Limit {
             limit: Limit::MotorThermal {
                 measured: Percent::from_percent(101),
                 limit: Percent::from_percent(95),

@@ -191,11 +191,13 @@ export const SENTENCES_FR = {
   'a stop at the drive that has disabled operation, by an input or a key,': 'un arrêt au variateur qui a interdit la marche, par une entrée ou une touche,',
   'a stop at the drive, by an input or a key,': 'un arrêt au variateur, par une entrée ou une touche,',
   'give control back to the line first, or reset the fault at the drive': 'rendre d’abord la commande à la liaison, ou réarmer le défaut au variateur',
+  'see which one it is, and start again': 'voir lequel, et remettre en marche',
   'see which one it is, release it, and start again': 'voir lequel, le relâcher, et remettre en marche',
   'stop the motor, and give a setpoint': 'arrêter le moteur et donner une consigne',
   'the drive\'s map names no bit that tells whether local control is forced: name it (`remote`), or reset the fault at the drive': 'l’affectation du variateur ne nomme aucun bit qui dise si la commande locale est forcée : le nommer (`remote`), ou réarmer le défaut au variateur',
   'the reference W401 is negative: stop the motor, and give a setpoint': 'la référence W401 est négative : arrêter le moteur et donner une consigne',
   'the sign of the reference W401, which another master has turned round,': 'le signe de la référence W401, qu’un autre maître a inversé,',
+  'whoever turns the motor the other way, the sign of a reference, an input or a key,': 'ce qui fait tourner le moteur dans l’autre sens, le signe d’une consigne, une entrée ou une touche,',
   'see what decides instead; the run command is withdrawn, unless that was accepted': 'voir ce qui décide à la place ; l’ordre de marche est retiré, sauf si cela a été accepté',
 
   // Altivar 312.
