@@ -13,6 +13,9 @@ const TWENTY: Setpoint = Setpoint::Frequency(Frequency::from_hertz(20));
 /// What tells one Altivar 28 from another: its nominal current (BBV51701 p. 57).
 const INV_OF_A_28: u16 = 555;
 
+/// The rating of a 312, 13: 15 kW (BBV51701 p. 26).
+const NCV_OF_A_312: u16 = 3_011;
+
 /// One of the same family, of another size.
 fn another(family: Family) -> Box<dyn Model> {
     match five(family) {
@@ -48,8 +51,10 @@ async fn a_drive_that_was_exchanged_between_two_looks_is_not_started_by_the_othe
 
             rig.machine.power(false);
             let other = rig.simulated.add_beside(ADDRESS, another(family)).unwrap();
-            if five(family) == Five::Atv28 {
-                assert!(other.poke(INV_OF_A_28, other.peek(INV_OF_A_28).unwrap() + 50));
+            match five(family) {
+                Five::Atv28 => assert!(other.poke(INV_OF_A_28, other.peek(INV_OF_A_28).unwrap() + 50)),
+                Five::Atv312 => assert!(other.poke(NCV_OF_A_312, 13)),
+                _ => {}
             }
             rig.drive.status().await.unwrap();
             for _ in 0..2 {
