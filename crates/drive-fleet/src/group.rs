@@ -336,7 +336,9 @@ impl Group {
                 if failed.load(Ordering::Relaxed) {
                     return None;
                 }
-                let ticket = member.order_on(Some(leave), None, order);
+                // Its leave ends with any stop: its own time is that of a dialog on a line that has room for nothing more.
+                let expires = Instant::now() + 2 * member.settings().times.lifetime;
+                let ticket = member.order_on(Some(leave), Some(expires), order);
                 let outcome = ticket.unheard(false).await;
                 told.hold(ticket);
                 failed.fetch_or(!outcome.lets_a_start_follow(), Ordering::Relaxed);
