@@ -40,14 +40,14 @@ async fn a_drive_that_was_exchanged_between_two_looks_is_not_started_by_the_othe
             rig.drive.set_setpoint(TWENTY).await.unwrap();
             rig.drive.start(Direction::Forward).await.unwrap();
             rig.drive.stop(drive_core::StopMode::Ramp).await.unwrap();
-            rig.until("standstill", |status| status.is_standstill()).await;
+            rig.until("standstill", drive_core::Status::is_standstill).await;
             // The same drive behind a power cut says the same.
             rig.machine.power_cycle();
             rig.drive.status().await.unwrap();
             rig.drive.set_setpoint(TWENTY).await.unwrap();
             rig.drive.start(Direction::Forward).await.unwrap();
             rig.drive.stop(drive_core::StopMode::Ramp).await.unwrap();
-            rig.until("standstill", |status| status.is_standstill()).await;
+            rig.until("standstill", drive_core::Status::is_standstill).await;
 
             rig.machine.power(false);
             let other = rig.simulated.add_beside(ADDRESS, another(family)).unwrap();

@@ -166,11 +166,10 @@ impl Wire {
         let on_the_wire = self.transmissions.get(index).map(|transmission| self.ends(transmission, upto));
         let Some(transmission) = self.transmissions.get_mut(index) else { return Vec::new() };
         let heard = transmission.characters.get(transmission.delivered..upto).unwrap_or_default();
-        let is_unheard = match (&transmission.kind, line.defective.unheard()) {
-            (Kind::Request { .. }, Some(Unheard::Requests)) => true,
-            (Kind::AnswerToAnother, Some(Unheard::Answers)) => true,
-            _ => false,
-        };
+        let is_unheard = matches!(
+            (&transmission.kind, line.defective.unheard()),
+            (Kind::Request { .. }, Some(Unheard::Requests)) | (Kind::AnswerToAnother, Some(Unheard::Answers))
+        );
         let piece = if is_unheard { Vec::new() } else { self.master.errors.read(heard) };
         transmission.delivered = upto;
         let is_over = upto == transmission.characters.len();
