@@ -116,7 +116,7 @@ table! {
         "see who writes its parameters, and why its watchdog does not stay as it is set";
     /// A measured value is above its limit.
     LimitExceeded: "limit_exceeded", "above its limit", Warning, false,
-        "look at load, fan and filters; of a frequency at who gives it, and at the limit";
+        "look at load, fan and filters, or at who gives a frequency above its limit";
     /// It shows an alarm that does not trip.
     Warning: "warning", "the drive shows an alarm", Warning, false,
         "read its faults: they name the alarm";

@@ -77,7 +77,7 @@ export const SENTENCES_FR = {
   'see which drive it is, and whether it is set up as that': 'voir quel variateur c’est, et s’il est configuré comme tel',
   'see how busy its line is': 'voir à quel point sa ligne est chargée',
   'switch them off at the drive, or accept them by name': 'les désactiver sur le variateur, ou les accepter par leur nom',
-  'look at load, fan and filters': 'voir la charge, le ventilateur et les filtres',
+  'look at load, fan and filters, or at who gives a frequency above its limit': 'voir la charge, le ventilateur et les filtres, ou qui donne une fréquence au-dessus de sa limite',
   'read its faults: they name the alarm': 'lire ses défauts : ils nomment l’alarme',
   'give control back there': 'y rendre la commande',
   'wait until it is confirmed': 'attendre qu’il soit confirmé',
