@@ -119,7 +119,7 @@ const FOUND: &[(&str, &str)] = &[
     ("line: pause-unkept", "E:18204"),
     ("line: command-sent-late", "E:26300"),
     ("line: lost-write-told-as-expired", "A:200156991"),
-    ("line: sent-told-as-unsent", "F:2066341"),
+    ("line: sent-told-as-unsent", "F:4374893"),
     ("line: late-answer-unfeared", "F:2261288"),
 ];
 
