@@ -133,7 +133,7 @@ const FOUND_BY_STORIES: &[(&str, &str)] = &[
     ("family: ForgetEndsTheLease", "6.4.7.f67x2.e9.o5.f47x3.o5"),
     ("family: StopSentEndsTheLease", "5.3.9.o6.o1.l8.l8.o8.l8"),
     ("family: NoOutputIsStandstill", "6.4.0.l6.l3.l7.l1.e6.o4.l2.o5.o10.o1.o11.o10.o5.o4"),
-    ("line: another-slaves-answer", "9.0.1.f35x3.l4.l6.o1.f60x5.o10.o3.f10x2.l3"),
+    ("line: another-slaves-answer", "7.3.0.f35x1.o5.o6"),
     ("line: crc-unchecked", "7.3.0.o6.l1.o11.f28x3.o7.l6"),
     ("line: transaction-unchecked", "7.4.0.o11.o5.o3.o11.f12x2.l5.o9.f71x2.o11.l6.f63x2.o11.o8"),
     ("line: early-answer-believed", "3.0.0.f34x2.o7.o8.e18.o13.f60x1.o2.o8.e8.e15.o6.l1.l2.o0"),
@@ -141,7 +141,7 @@ const FOUND_BY_STORIES: &[(&str, &str)] = &[
     ("line: edge-repeated", "2.1.0.l4.l2.f31x0.e10.o1.f25x1.l7.o15.o12.o8.f42x4.f34x0.o11.f33x4"),
     ("line: command-sent-late", "1.4.0.o5.f16x0.o9.o7.e15.f70x5.e12.o6.l8.o11.f62x2.o5.e5.o5.l8"),
     ("line: sent-told-as-unsent", "0.4.0.o5.l5.l4.o19.o8.f62x0.l8.o10.o19.o6.f35x3.e18.f16x1.o16.f13x0"),
-    ("line: lost-write-told-as-expired", "6.4.7.f67x2.e9.o5.f47x3.o5"),
+    ("line: lost-write-told-as-expired", "0.4.7.f50x3.o7.o11.l3.f61x4.o5.f15x2"),
 ];
 
 /// Each planted defect that the matrix has found, against the cell that found it, which is sound without it.
