@@ -5,7 +5,7 @@ use std::{ops::Range, sync::Arc, time::Duration};
 use drive_bus::{Line, LineConfig};
 use drive_core::{SerialSettings, SlaveAddress, serial::CharacterFormat};
 use drive_families::{Family, SetUp, simulated};
-use drive_fleet::{DriveSettings, ExitAction, Fleet, Periods};
+use drive_fleet::{DriveSettings, ExitAction, Fleet, Periods, Times};
 use drive_sim::{SimLine, Wiring};
 use tokio::{sync::watch, task::AbortHandle};
 
@@ -27,6 +27,9 @@ const PERIODS: Periods = Periods {
     slow: Duration::from_secs(5),
     max_age: Duration::from_secs(5),
 };
+
+/// The story gives a setpoint right behind a reset, after which an Altivar 21 is deaf for two seconds.
+const LIFETIME: Duration = Duration::from_secs(3);
 
 /// What was done to each drive at the end.
 type Actions = Vec<(Arc<str>, ExitAction)>;
@@ -71,8 +74,9 @@ impl Plant {
             let line = Line::over(simulated.in_memory_precise(), config);
             builder = builder.line(settings.to_string(), line.clone());
             for name in names {
-                let drive_settings =
+                let mut drive_settings =
                     DriveSettings { periods: PERIODS, ..DriveSettings::controlled(name.to_string()) };
+                drive_settings.times = Times { lifetime: LIFETIME, ..drive_settings.times };
                 builder = builder.drive(
                     &settings.to_string(),
                     name.slave.number(),
