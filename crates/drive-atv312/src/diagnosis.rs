@@ -114,7 +114,7 @@ impl<P: Port> Atv312<P> {
         if !matches!(recognised(&identity), Recognised::NotMine { .. }) {
             let codes = &mut identity.codes;
             self.collect(Class::Background, codes, &SIZE).await?;
-            self.known.size = Some(codes.clone()).filter(|codes| !codes.is_empty());
+            self.known.size = Some(Identity { codes: codes.clone(), ..Identity::default() });
             for row in [INV.row(), UDP.row(), TSP.row()] {
                 self.collect(Class::Background, codes, &[row]).await?;
             }
@@ -149,11 +149,9 @@ impl<P: Port> Atv312<P> {
         if self.known.kind.is_none() {
             self.known.kind = Some(recognised(&self.named(Class::Command).await?));
         }
-        let mut size = Vec::new();
-        self.collect(Class::Command, &mut size, &SIZE).await?;
-        let is_other = self.known.size.as_ref().is_some_and(|before| *before != size);
-        self.known.size.get_or_insert(size);
-        Ok(is_other.then_some(Refusal::Exchanged).or(self.refuses_writes()))
+        let mut size = Identity::default();
+        self.collect(Class::Command, &mut size.codes, &SIZE).await?;
+        Ok(size.refuses_start(&mut self.known.size).or(self.refuses_writes()))
     }
 }
 

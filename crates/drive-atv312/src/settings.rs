@@ -3,7 +3,7 @@
 //! replaces a reference, the limits.
 
 use drive_core::{
-    Absent, Class, Error, ErrorKind, Frequency, Ground, Port, RawWord, Recognised, Refusal, Result,
+    Absent, Class, Error, ErrorKind, Frequency, Ground, Identity, Port, Recognised, Refusal, Result,
     SelfRestart, Speed, StopMode,
     registers::{Register, access::Kind},
 };
@@ -100,7 +100,7 @@ pub(crate) struct Known {
     /// Whether it is an Altivar 312, once it was asked.
     pub(crate) kind: Option<Recognised>,
     /// What it has said of its size.
-    pub(crate) size: Option<Vec<RawWord>>,
+    pub(crate) size: Option<Identity>,
     /// The registers that this drive lacks.
     pub(crate) absent: Absent,
     pub(crate) speeds: Option<(Speed, Speed)>,

@@ -1,7 +1,7 @@
 //! Whether the program stood still, as in a machine that was paused: what it reads behind that may have lain in a socket all the while.
 
 use std::{
-    sync::{Arc, Mutex, PoisonError, Weak},
+    sync::{Mutex, PoisonError, Weak},
     time::Duration,
 };
 
@@ -62,7 +62,7 @@ pub(super) async fn beat(plant: Weak<Inner>) {
     loop {
         beats.tick().await;
         let Some(plant) = plant.upgrade() else { return };
-        Arc::as_ref(&plant).pulse.beat();
+        plant.pulse.beat();
     }
 }
 
