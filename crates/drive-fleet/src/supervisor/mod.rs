@@ -266,6 +266,10 @@ impl Supervisor {
         self.checks.reconfigure(now, settings);
         self.pace.reconfigure(now, settings.periods);
         self.settings = settings.clone();
+        if self.settings.limits.high.is_none() {
+            // What has no limit is above none.
+            self.exceeded.remove(observe::FREQUENCY);
+        }
         self.changed = true;
     }
 

@@ -21,6 +21,8 @@ use crate::{
 
 /// How many trips are kept for each drive.
 const TRIPS: usize = 16;
+/// By which an output above its limit is known among those that are exceeded.
+pub(super) const FREQUENCY: &str = "frequency";
 /// A silence in which a drive can have been switched off and on, or exchanged: what is checked at a connect is checked
 /// again.
 const SWITCHED_OFF: Duration = Duration::from_secs(1);
@@ -128,7 +130,7 @@ impl Supervisor {
                 .zip(limit)
                 .map(|(measured, limit)| (Limit::Current { measured, limit }, measured > limit))
         });
-        self.check_limit("frequency", {
+        self.check_limit(FREQUENCY, {
             let limit = self.settings.limits.high;
             status
                 .value

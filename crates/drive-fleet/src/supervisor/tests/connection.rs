@@ -412,6 +412,24 @@ fn a_motor_that_gets_too_hot_is_told_and_told_when_it_is_back() {
     }
 }
 
+#[test]
+fn a_motor_whose_limit_was_taken_away_is_above_none() {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    rig.drive.status.output_frequency = Some(Frequency::from_hertz(30));
+    let with = |high: Option<Frequency>, rig: &Rig| {
+        let mut settings = rig.machine.settings.clone();
+        settings.limits.high = high;
+        settings
+    };
+    for (high, above) in [(Some(Frequency::from_hertz(20)), true), (None, false)] {
+        let settings = with(high, &rig);
+        rig.machine.handle_settings(rig.now, &settings);
+        rig.pass(1_500 * MS);
+        assert_eq!(!rig.snapshot().exceeded.is_empty(), above, "{high:?}");
+    }
+}
+
 /// The same rig with another drive at the end of its line, which was opened again.
 fn exchanged(mut rig: Rig) -> Rig {
     let identity = Identity { model: Some("two".to_owned()), ..Identity::default() };
