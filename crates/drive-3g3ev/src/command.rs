@@ -16,8 +16,8 @@ use crate::{
 };
 
 impl<P: Port> Drive3g3ev<P> {
-    /// Refuses a start that would not come into force, before anything is written.
-    pub(crate) async fn check_start(&mut self, direction: Direction) -> Result<()> {
+    /// Refuses a start that would not come into force, before anything is written. Else: whether it turns a motor round that runs.
+    pub(crate) async fn check_start(&mut self, direction: Direction) -> Result<bool> {
         let order = Order::Start(direction);
         self.look_at_unit().await?;
         let status = self.read_status(Class::Command).await?;
@@ -34,11 +34,12 @@ impl<P: Port> Drive3g3ev<P> {
             return Err(self.refused(order, cut.unwrap_or(Refusal::State(State::NotReady))));
         }
         // The reference that it finds was given in the old unit, or is told in it.
-        self.check_unit(order)
+        self.check_unit(order)?;
+        Ok(is_run(&status) && status.direction != Some(direction))
     }
 
     pub(crate) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
-        self.check_start(direction).await?;
+        let turns_round = self.check_start(direction).await?;
         // The inputs of n06 to n08 stand in the same word, and are left as they are: as they are now, where one was on, for they do not
         // outlive the supply.
         if self.command.is_none_or(|held| held.intersects(Command::INPUTS)) {
@@ -65,13 +66,14 @@ impl<P: Port> Drive3g3ev<P> {
             }
             Err(error) => return Err(error),
         }
-        self.see_start(direction, word).await.map_err(Error::after_write)
+        self.see_start(direction, word, turns_round).await.map_err(Error::after_write)
     }
 
     /// Reads until the run command is in force: 0001h holds it, bits 9 and A of 002Ch name the bus, the drive runs in that
     /// direction with its output on, and 0023h is the reference of 0002h. A motor that turned the other way slows down
-    /// first: it is on its way, and the status tells the direction in which it still turns.
-    async fn see_start(&mut self, direction: Direction, word: Command) -> Result<Status> {
+    /// first: it is on its way, whether the status tells the direction in which it still turns or the one that is ordered, which the
+    /// manual leaves open.
+    async fn see_start(&mut self, direction: Direction, word: Command, turns_round: bool) -> Result<Status> {
         let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
         let mut first = None;
         loop {
@@ -83,7 +85,8 @@ impl<P: Port> Drive3g3ev<P> {
             };
             let output = status.raw(address::OUTPUT_FREQUENCY);
             let directed = status.direction == Some(direction) || output < first;
-            if because.is_none() && is_run(&status) && directed && !self.is_brought_down(&status) {
+            let obeys = turns_round || !self.is_brought_down(&status);
+            if because.is_none() && is_run(&status) && directed && obeys {
                 let verdict = self.verdict(&status);
                 return Ok(Status { verdict, ..status });
             }

@@ -69,7 +69,7 @@ impl<P: Port> Drive for Drive3g3ev<P> {
 
     async fn may_start(&mut self, direction: Direction, _: Option<Setpoint>) -> Result<()> {
         self.registers.begin_order();
-        self.check_start(direction).await
+        self.check_start(direction).await.map(drop)
     }
 
     /// Stops by a run command of 0, the only stop that the manual has, whatever mode is asked for: the motor stops in the

@@ -7,7 +7,7 @@ use drive_core::{
     Class, Direction, Drive, Error, ErrorKind, Frequency, Lack, Lease, Motion, Percent, Refusal, Result,
     Setpoint, State, StopMode, Verdict,
 };
-use drive_sim::{Panel, SimSlave};
+use drive_sim::{Panel, SimSlave, models::drive_3g3ev::Drive3g3ev as Model};
 use drive_testing::{
     bench,
     words::{Asked, Words, lacks_within},
@@ -141,6 +141,30 @@ async fn a_motor_that_is_turned_round_is_on_its_way_and_told_in_its_old_directio
     assert!(status.output_frequency < Some(Frequency::from_hertz(50)), "{status}");
     while machine.observe().output_frequency != -5_000 {
         drive.keep_alive().await.unwrap();
+    }
+}
+
+/// The manual does not say which of the two bit 1 of 0020h is.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_is_turned_round_slowly_is_started_also_where_its_drive_tells_the_ordered_direction() {
+    for told in [Model::new(), Model::new().telling_ordered_direction()] {
+        let rig = Rig::new([told.with_fault_reset_function(RESET)]);
+        let machine = rig.machines[0].clone();
+        // n20: 20 s from nought to the highest frequency.
+        machine.poke(0x0114, 200);
+        let mut drive = rig.drive(1);
+        drive.set_setpoint(FIFTY).await.unwrap();
+        drive.start(Direction::Forward).await.unwrap();
+        while machine.observe().output_frequency != 5_000 {
+            drive.status().await.unwrap();
+        }
+        let status = drive.start(Direction::Reverse).await.unwrap();
+        assert_eq!(status.state, State::Running, "{status}");
+        while machine.observe().output_frequency != -5_000 {
+            let status = drive.status().await.unwrap();
+            assert!(!matches!(status.verdict, Some(Verdict::NotInForce { .. })), "{status}");
+        }
+        assert_eq!(drive.status().await.unwrap().verdict, Some(Verdict::InForce));
     }
 }
 

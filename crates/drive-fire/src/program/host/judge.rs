@@ -82,13 +82,16 @@ pub(super) fn status(said: &Said, around: &[Look]) -> Result<(), String> {
         output(hertz.centihertz().cast_signed(), around)
             .map_err(|why| format!("{why}: told of {:?} ago", said.age))?;
     }
-    // Of one that does not change meanwhile, or of a shaft that only slows down, more is known than its output.
-    let first = around.first().map(|look| look.seen).unwrap_or_default();
-    let is_as_before = |seen: &Observation| {
-        seen.running == first.running
-            && (!first.running || seen.shaft_frequency.abs_diff(first.shaft_frequency) <= 20)
+    // Of one that does not change meanwhile, or of a shaft that only slows down, more is known than its output: not of one whose
+    // simulator was killed. It may have run between the last look and that.
+    let Some(first) = around.first() else { return Ok(()) };
+    let is_as_before = |look: &Look| {
+        look.life == first.life
+            && look.seen.running == first.seen.running
+            && (!first.seen.running
+                || look.seen.shaft_frequency.abs_diff(first.seen.shaft_frequency) <= 20)
     };
-    let is_steady = around.iter().all(|look| is_as_before(&look.seen));
+    let is_steady = around.iter().all(is_as_before);
     let mut against = around.iter().map(|look| contradiction(&said.status, &look.seen));
     match against.by_ref().collect::<Option<Vec<_>>>() {
         Some(why) if is_steady && !why.is_empty() => {

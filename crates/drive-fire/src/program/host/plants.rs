@@ -163,6 +163,16 @@ mod tests {
         let said = stands.said(3_400, at_rest());
         let late = Said { told: said.asked + Duration::from_millis(600), ..said };
         assert_eq!(judge::status(&late, &stands.looks), Ok(()));
+        // It coasted, was started, and told so before its simulator was killed; the next is another one.
+        let mut coasts = Second::of([0; 8]);
+        for (look, hertz) in coasts.looks.iter_mut().zip([16, 15, 14, 13, 12, 11]) {
+            look.seen.shaft_frequency = 100 * hertz;
+        }
+        let killed = coasts.begun + Duration::from_millis(1_100);
+        coasts.looks.retain(|look| look.told <= killed);
+        let asked = coasts.begun + Duration::from_millis(2_600);
+        coasts.looks.push(Look { asked, told: asked, life: 2, seen: seen(0) });
+        assert_eq!(coasts.judged(120, driven(13)), Ok(()));
         // What is told as old is judged by nobody.
         let runs = Second::of([30; 8]);
         let stale = Said { is_good: false, ..runs.said(200, at_rest()) };

@@ -8,6 +8,7 @@
 //! - 100 % is 60 Hz, both ramps are n20, measured to 60 Hz, n53 counts 0.1 Hz;
 //! - a fault cuts the output and the motor coasts; afterwards, and after the STOP key, a run command acts again when it
 //!   was 0 once;
+//! - bit 1 of 0020h is the direction in which the motor turns ([`Drive3g3ev::telling_ordered_direction`]: the one that is ordered);
 //! - RUN stands as long as the output feeds the motor;
 //! - bit 7 of 0020h is always 1, as in the only sample (§4.2.2).
 
@@ -77,6 +78,7 @@ pub struct Drive3g3ev {
     supplied: bool,
     fault_reset: Option<u16>,
     refuses_reserved: bool,
+    tells_ordered_direction: bool,
 }
 
 impl Drive3g3ev {
@@ -111,6 +113,7 @@ impl Drive3g3ev {
             supplied: true,
             fault_reset: None,
             refuses_reserved: false,
+            tells_ordered_direction: false,
         }
     }
 
@@ -124,6 +127,12 @@ impl Drive3g3ev {
     #[must_use]
     pub fn refusing_reserved(self) -> Self {
         Self { refuses_reserved: true, ..self }
+    }
+
+    /// This drive, whose bit 1 of 0020h is the direction that is ordered also while the motor turns the other way.
+    #[must_use]
+    pub fn telling_ordered_direction(self) -> Self {
+        Self { tells_ordered_direction: true, ..self }
     }
 }
 

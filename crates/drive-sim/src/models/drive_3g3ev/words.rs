@@ -58,7 +58,8 @@ impl Drive3g3ev {
 
     fn signals(&self) -> Signals {
         let turning = self.motor.output_frequency();
-        let reverse = if turning == 0 { self.reverse_selected() } else { turning < 0 };
+        let ordered = turning == 0 || self.tells_ordered_direction;
+        let reverse = if ordered { self.reverse_selected() } else { turning < 0 };
         let contacts = self.contacts();
         let mut signals = Signals::empty();
         signals.set(Signals::RUN, self.motor.is_fed());
