@@ -18,6 +18,7 @@ use tokio::time::{Instant, sleep};
 
 use crate::{
     Error,
+    queued::Queued,
     report::{Goal, Report, Unit, millis, quantile},
     rig::{DRIVES, virtual_runtime},
     usage::{memory_kib, processor_time},
@@ -150,8 +151,12 @@ async fn stop_all(
     plant: &Plant,
     sites: &[SimLine],
 ) -> Result<(), Error> {
+    let queued = Queued::default();
+    let _heard = tracing::subscriber::set_default(queued.clone());
     let bound = plant.fleet().plan("line 0").ok_or("the line has no plan")?.stop_all(0);
     let caller = Caller::new("bench", "bench", Rights::ALL);
+    let mut run: Vec<SimSlave> = sites.iter().flat_map(SimLine::slaves).collect();
+    queued.expect(run.len());
     let (arrived, used) = (Instant::now(), processor_time());
     let action = Action::Stop(StopMode::Ramp.into());
     let request = Request { id: None, target: Target::All, action, lifetime: LIFETIME, arrived };
@@ -160,7 +165,6 @@ async fn stop_all(
     let what = name("a stop of all: processor time until it is given to each");
     report.row(SECTION, what, Unit::Millis, millis(given), Goal::AtMost(GIVEN_MS));
 
-    let mut run: Vec<SimSlave> = sites.iter().flat_map(SimLine::slaves).collect();
     while !run.is_empty() {
         if arrived.elapsed() > PATIENCE {
             return Err(format!("{} drives run behind a stop of all", run.len()).into());
@@ -173,6 +177,9 @@ async fn stop_all(
         });
     }
     let taken = arrived.elapsed();
+    let last = queued.last().ok_or("not every stop was in the queue of its line")?;
+    let what = name("… until that of each is in the queue of its line");
+    report.row(SECTION, what, Unit::Millis, millis(last.saturating_sub(used)), Goal::AtMost(GIVEN_MS));
     report.row(
         SECTION,
         name("… until the last drive has it, by the bound that its line tells"),

@@ -19,6 +19,7 @@ mod masters;
 mod parts;
 mod peers;
 mod plot;
+mod queued;
 mod report;
 mod rig;
 mod simulator;

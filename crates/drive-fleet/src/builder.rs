@@ -1,7 +1,7 @@
 //! [`FleetBuilder`]: lines and drives become a fleet, after everything that can be checked beforehand is.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     sync::{Arc, RwLock},
     time::Duration,
 };
@@ -18,7 +18,7 @@ use tokio::{
 
 use crate::{
     event::Teller,
-    fleet::{Fleet, Members},
+    fleet::{Fleet, Members, Roster},
     handle::Entry,
     line_entry::LineEntry,
     plan::{Demand, Forecast, LineBudget, PlanProblem, forecast},
@@ -129,6 +129,15 @@ struct Wire {
     budget: LineBudget,
     /// The line of a fleet that runs, and its drives.
     standing: Option<(Arc<LineEntry>, Vec<Arc<Entry>>)>,
+    /// Which of the members that are added are on it.
+    added: Vec<usize>,
+}
+
+impl Wire {
+    /// The drives of a fleet that runs.
+    fn standing(&self) -> &[Arc<Entry>] {
+        self.standing.as_ref().map(|(_, entries)| entries.as_slice()).unwrap_or_default()
+    }
 }
 
 /// What a drive is before the fleet starts.
@@ -142,6 +151,9 @@ struct Member {
 #[must_use]
 pub struct FleetBuilder {
     lines: Vec<Wire>,
+    /// The number of each line by its name, and the names of all drives: nobody is looked for among all of them.
+    by_name: BTreeMap<String, usize>,
+    names: BTreeSet<String>,
     members: Vec<Member>,
     /// The first thing that cannot be.
     problem: Option<FleetError>,
@@ -154,6 +166,8 @@ impl Fleet {
     pub const fn builder() -> FleetBuilder {
         FleetBuilder {
             lines: Vec::new(),
+            by_name: BTreeMap::new(),
+            names: BTreeSet::new(),
             members: Vec::new(),
             problem: None,
             refuses_plans: true,
@@ -164,14 +178,20 @@ impl Fleet {
 
 impl FleetBuilder {
     /// Begins an addition to a fleet that runs.
-    pub(crate) fn addition(members: &Members) -> Self {
+    pub(crate) fn addition(members: &Roster) -> Self {
         let wire = |entry: &Arc<LineEntry>| Wire {
             name: entry.name.to_string(),
             line: entry.line.clone(),
             budget: entry.budget,
-            standing: Some((Arc::clone(entry), members.on(entry).cloned().collect())),
+            standing: Some((Arc::clone(entry), members.on_line(&entry.name).cloned().collect())),
+            added: Vec::new(),
         };
-        Self { lines: members.lines.iter().map(wire).collect(), ..Fleet::builder() }
+        Self {
+            lines: members.lines.iter().map(wire).collect(),
+            by_name: members.lines.iter().map(|entry| entry.name.to_string()).zip(0..).collect(),
+            names: members.entries.iter().map(|entry| entry.name.to_string()).collect(),
+            ..Fleet::builder()
+        }
     }
 
     /// Adds a line. What it gives follows from its configuration, as [`LineBudget::of`] says.
@@ -188,10 +208,12 @@ impl FleetBuilder {
         budget: impl FnOnce(LineBudget) -> LineBudget,
     ) -> Self {
         let (name, budget) = (name.into(), budget(LineBudget::of(&line.config())));
-        if self.lines.iter().any(|other| other.name == name) {
+        if self.by_name.contains_key(&name) {
             self.problem.get_or_insert(FleetError::NameTaken(name.clone()));
+        } else {
+            self.by_name.insert(name.clone(), self.lines.len());
         }
-        self.lines.push(Wire { name, line, budget, standing: None });
+        self.lines.push(Wire { name, line, budget, standing: None, added: Vec::new() });
         self
     }
 
@@ -219,7 +241,13 @@ impl FleetBuilder {
         open: impl FnOnce(Slave, SlaveAddress) -> Box<dyn Drive>,
     ) -> Self {
         match self.member(line, address, settings, open) {
-            Ok(member) => self.members.push(member),
+            Ok(member) => {
+                self.names.insert(member.settings.name.clone());
+                if let Some(wire) = self.lines.get_mut(member.line) {
+                    wire.added.push(self.members.len());
+                }
+                self.members.push(member);
+            }
             Err(problem) => {
                 self.problem.get_or_insert(problem);
             }
@@ -235,22 +263,18 @@ impl FleetBuilder {
         open: impl FnOnce(Slave, SlaveAddress) -> Box<dyn Drive>,
     ) -> Result<Member, FleetError> {
         let drive = || settings.name.clone();
-        let mut standing =
-            self.lines.iter().filter_map(|wire| wire.standing.as_ref()).flat_map(|(_, all)| all);
-        if self.members.iter().any(|other| other.settings.name == settings.name)
-            || standing.any(|entry| *entry.name == *settings.name)
-        {
+        if self.names.contains(&settings.name) {
             return Err(FleetError::NameTaken(drive()));
         }
-        let Some((line, wire)) = self.lines.iter().enumerate().find(|(_, wire)| wire.name == line_name)
-        else {
+        let line = self.by_name.get(line_name).copied();
+        let Some((line, wire)) = line.and_then(|line| Some((line, self.lines.get(line)?))) else {
             return Err(FleetError::NoSuchLine { drive: drive(), line: line_name.to_owned() });
         };
         let slave = SlaveAddress::try_from(address)
             .map_err(|problem| FleetError::NoAddress { drive: drive(), problem })?;
-        let standing = wire.standing.as_ref().map(|(_, entries)| entries.as_slice()).unwrap_or_default();
-        if self.members.iter().any(|other| other.line == line && other.drive.slave() == slave)
-            || standing.iter().any(|entry| entry.slave == slave)
+        let mut added = self.added_to(wire);
+        if added.any(|other| other.drive.slave() == slave)
+            || wire.standing().iter().any(|entry| entry.slave == slave)
         {
             return Err(FleetError::AddressTaken { drive: drive(), line: line_name.to_owned(), slave });
         }
@@ -268,6 +292,10 @@ impl FleetBuilder {
         check_settings(&settings, capabilities, opened.watchdog_capability())
             .map_err(|problem| FleetError::Setting { drive: drive(), problem })?;
         Ok(Member { line, settings, drive: opened })
+    }
+
+    fn added_to(&self, wire: &Wire) -> impl Iterator<Item = &Member> {
+        wire.added.iter().filter_map(|number| self.members.get(*number))
     }
 
     /// Tells here what is to be kept of the run commands of this side: what becomes
@@ -311,30 +339,28 @@ impl FleetBuilder {
         Ok(all)
     }
 
-    fn check(self) -> Result<(Vec<Arc<LineEntry>>, Vec<Member>), FleetError> {
-        let Self { lines, members, problem, refuses_plans, .. } = self;
-        if let Some(problem) = problem {
+    fn check(mut self) -> Result<(Vec<Arc<LineEntry>>, Vec<Member>), FleetError> {
+        if let Some(problem) = self.problem.take() {
             return Err(problem);
         }
-        let mut planned = Vec::with_capacity(lines.len());
-        for (number, wire) in lines.into_iter().enumerate() {
-            let standing = wire.standing.iter().flat_map(|(_, entries)| entries).map(|entry| entry.demand());
-            let added = members.iter().filter(|member| member.line == number).map(Member::demand);
-            let demands: Vec<_> = standing.chain(added).collect();
+        let mut plans = Vec::with_capacity(self.lines.len());
+        for wire in &self.lines {
+            let standing = wire.standing().iter().map(|entry| entry.demand());
+            let demands: Vec<_> = standing.chain(self.added_to(wire).map(Member::demand)).collect();
             let Forecast { plan, problem } = forecast(wire.budget, &demands, 0);
-            if let Some(problem) = problem.filter(|_| refuses_plans) {
-                return Err(FleetError::Plan { line: wire.name, problem });
+            if let Some(problem) = problem.filter(|_| self.refuses_plans) {
+                return Err(FleetError::Plan { line: wire.name.clone(), problem });
             }
-            planned.push((wire, plan));
+            plans.push(plan);
         }
-        let entry = |(Wire { name, line, budget, standing }, plan)| match standing {
+        let entry = |(Wire { name, line, budget, standing, .. }, plan)| match standing {
             Some((entry, _)) => {
                 entry.set_plan(plan);
                 entry
             }
             None => Arc::new(LineEntry::new(name, line, budget, plan)),
         };
-        Ok((planned.into_iter().map(entry).collect(), members))
+        Ok((self.lines.into_iter().zip(plans).map(entry).collect(), self.members))
     }
 }
 
@@ -469,6 +495,7 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
         callers: BTreeMap::new(),
         askers: BTreeMap::new(),
         settings: Some(Arc::clone(&settings)),
+        round: None,
     };
     let turns = Arc::clone(&line.turns);
     tokio::spawn(

@@ -29,6 +29,7 @@ use crate::{
     line_entry::LineEntry,
     message::Urgent,
     plan::LinePlan,
+    round::Round,
 };
 
 /// Who belongs to the fleet.
@@ -45,6 +46,7 @@ pub(crate) struct Roster {
     by_name: HashMap<Arc<str>, usize>,
     /// By the name of the line, in the order in which they were added.
     by_line: HashMap<Arc<str>, Vec<usize>>,
+    lines_by_name: HashMap<Arc<str>, usize>,
 }
 
 impl Deref for Roster {
@@ -62,11 +64,16 @@ impl Roster {
             by_line.entry(Arc::clone(&entry.line.name)).or_default().push(number);
         }
         let by_name = members.entries.iter().map(|entry| Arc::clone(&entry.name)).zip(0..).collect();
-        Self { members, by_name, by_line }
+        let lines_by_name = members.lines.iter().map(|entry| Arc::clone(&entry.name)).zip(0..).collect();
+        Self { members, by_name, by_line, lines_by_name }
     }
 
     fn named(&self, name: &str) -> Option<&Arc<Entry>> {
         self.members.entries.get(*self.by_name.get(name)?)
+    }
+
+    fn line_named(&self, name: &str) -> Option<&Arc<LineEntry>> {
+        self.members.lines.get(*self.lines_by_name.get(name)?)
     }
 
     pub(crate) fn on_line(&self, line: &str) -> impl Iterator<Item = &Arc<Entry>> {
@@ -196,7 +203,7 @@ impl Fleet {
     /// The plan of a line.
     #[must_use]
     pub fn plan(&self, line: &str) -> Option<LinePlan> {
-        self.members().lines.iter().find(|entry| &*entry.name == line).map(|entry| entry.plan())
+        self.members().line_named(line).map(|entry| entry.plan())
     }
 
     /// Ends the fleet: each drive's policy acts, and what was done is listed. What is not done after `limit` is given up;
@@ -255,7 +262,9 @@ pub(crate) fn end(
     why: Policy,
     limit: Duration,
 ) -> impl Future<Output = Vec<(Arc<str>, ExitAction)>> + Send + use<> {
-    tell(&entries, || Urgent::Exit(why));
+    let round = Round::begin();
+    tell(&entries, || Urgent::Exit(why, round.part()));
+    drop(round);
     async move {
         let all_done = || join_all(entries.iter().map(|entry| exit_action(entry)));
         let actions = match tokio::time::timeout(limit, all_done()).await {

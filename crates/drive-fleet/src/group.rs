@@ -2,7 +2,7 @@
 
 use std::{
     borrow::Cow,
-    collections::{HashMap, HashSet},
+    collections::HashMap,
     fmt,
     sync::{
         Arc,
@@ -27,6 +27,7 @@ use crate::{
     handle::{DriveHandle, Entry},
     line_entry::LineEntry,
     outcome::{Order, Outcome, Refused, Unconfirmed, Unknown, Until},
+    round::Round,
     snapshot::{Link, Snapshot, has_reached},
     stop_order::{StopOrder, strength},
     supervisor::Leave,
@@ -179,10 +180,23 @@ impl Group {
 
     /// The same group for one act: behind all of its commands stands one id.
     fn in_one_act(&self) -> Self {
+        if self.members.iter().all(|member| member.act().id.is_some()) {
+            return self.clone();
+        }
         let id = self.fleet.new_act();
-        let with_id = |member: &DriveHandle| match member.act().id {
-            Some(_) => member.clone(),
-            None => member.in_act(&Arc::new(Act::clone(member.act()).with_id(&id))),
+        // Those that were of one act are of one again.
+        let mut last: Option<(Arc<Act>, Arc<Act>)> = None;
+        let with_id = |member: &DriveHandle| {
+            if member.act().id.is_some() {
+                return member.clone();
+            }
+            let known = last.take().filter(|(of, _)| Arc::ptr_eq(of, member.act()));
+            let (of, act) = known.unwrap_or_else(|| {
+                (Arc::clone(member.act()), Arc::new(Act::clone(member.act()).with_id(&id)))
+            });
+            let member = member.in_act(&act);
+            last = Some((of, act));
+            member
         };
         Self { fleet: self.fleet.clone(), members: self.members.iter().map(with_id).collect() }
     }
@@ -205,36 +219,49 @@ impl Group {
         self.in_one_act().stop_each(order.into(), true)
     }
 
-    /// Stops every drive of the group, by a broadcast first where there can be one and it is wanted.
+    /// Stops every drive of the group, by a broadcast first where there can be one and it is wanted. Line by line, and nothing is made here
+    /// but what a stop needs: among ten thousand drives the last is stopped no later than it has to be.
     fn stop_each(&self, order: StopOrder, by_broadcast: bool) -> GroupStop {
-        let (members, read_only): (Vec<&DriveHandle>, Vec<&DriveHandle>) =
-            self.members.iter().partition(|member| member.entry.settings().control);
         let standing = self.fleet.members();
-        let meant: HashSet<&Arc<str>> = self.members.iter().map(DriveHandle::name).collect();
-        // By the line.
-        let mut silent = HashMap::<_, u32>::new();
-        for member in &members {
-            let is_silent = member.snapshot().link != Link::Connected;
-            *silent.entry(Arc::as_ptr(&member.entry.line)).or_default() += u32::from(is_silent);
+        let mut lines = Vec::<OfLine<'_>>::new();
+        let mut by_line = HashMap::new();
+        let mut read_only = Vec::new();
+        let mut count = 0;
+        for member in &self.members {
+            if !member.entry.settings().control {
+                read_only.push(Arc::clone(member.name()));
+                continue;
+            }
+            let line = &member.entry.line;
+            let number = *by_line.entry(Arc::as_ptr(line)).or_insert_with(|| {
+                lines.push(OfLine { line, members: Vec::new() });
+                lines.len() - 1
+            });
+            if let Some(of_line) = lines.get_mut(number) {
+                of_line.members.push((count, member));
+                count += 1;
+            }
         }
-        let mut broadcasts = Vec::new();
-        let mut patience = HashMap::new();
-        for line in &standing.lines {
-            let Some(silent) = silent.get(&Arc::as_ptr(line)) else { continue };
+        let (mut broadcasts, round) = (Vec::new(), Round::begin());
+        let mut each = Vec::with_capacity(count);
+        for of_line in &lines {
+            let OfLine { line, members } = of_line;
             // It is first on the line, and no start of before can come behind the stops of each.
-            if let Some(write) = common_write(&standing, &meant, line, order.mode).filter(|_| by_broadcast) {
+            if let Some(write) = of_line.common_write(&standing, order.mode).filter(|_| by_broadcast) {
                 broadcasts.push((Arc::clone(&line.name), self.broadcast(line, write)));
             }
-            let mute = MUTE.max(*silent);
-            patience.insert(Arc::as_ptr(line), line.plan().stop_all(mute) + line.line.worst_case_stop());
+            let is_silent = |member: &DriveHandle| member.entry.snapshots.borrow().link != Link::Connected;
+            let silent = members.iter().map(|(_, member)| u32::from(is_silent(member))).sum();
+            let patience = line.plan().stop_all(MUTE.max(silent)) + line.line.worst_case_stop();
+            for (number, member) in members {
+                let stop = member.stop_within(order, Some(patience), Some(round.part()));
+                each.push((*number, Arc::clone(member.name()), stop));
+            }
         }
-        let stop = |member: &&DriveHandle| {
-            let patience = patience.get(&Arc::as_ptr(&member.entry.line)).copied();
-            let stop = member.stop_within(order, patience);
-            (Arc::clone(member.name()), stop)
-        };
-        let each = members.iter().map(stop).collect();
-        let read_only = read_only.iter().map(|member| Arc::clone(member.name())).collect();
+        drop(round);
+        // As the group has them.
+        each.sort_unstable_by_key(|(number, ..)| *number);
+        let each = each.into_iter().map(|(_, name, stop)| (name, stop)).collect();
         GroupStop::new(each, read_only, broadcasts)
     }
 
@@ -376,26 +403,30 @@ impl Group {
     }
 }
 
-/// The write that stops every drive of a line, if it means a stop to all of them and all are meant.
-fn common_write(
-    standing: &Roster,
-    meant: &HashSet<&Arc<str>>,
-    line: &LineEntry,
-    mode: StopMode,
-) -> Option<BroadcastWrite> {
-    let on_line = || standing.on_line(&line.name);
-    let write = |entry: &Arc<Entry>| {
-        let allowed = entry.settings().control && meant.contains(&entry.name);
-        let write = entry.broadcasts.iter().find(|(stop, _)| *stop == mode).map(|(_, write)| *write);
-        write.filter(|_| allowed)
-    };
-    let first = write(on_line().next()?)?;
-    let is_common = on_line().all(|entry| write(entry) == Some(first));
-    let under_way = |entry: &Arc<Entry>| entry.snapshots.borrow().stop.map(|stop| strength(stop.mode));
-    let (all, any) = on_line().map(under_way).fold((true, false), |(all, any), stop| {
-        (all && stop >= Some(strength(mode)), any || stop > Some(strength(mode)))
-    });
-    (is_common && !all && !any).then_some(first)
+/// Those of a group that are on one line and may be commanded, each with its place among all that may.
+struct OfLine<'a> {
+    line: &'a Arc<LineEntry>,
+    members: Vec<(usize, &'a DriveHandle)>,
+}
+
+impl OfLine<'_> {
+    /// The write that stops every drive of the line, if it means a stop to all of them and all are meant.
+    fn common_write(&self, standing: &Roster, mode: StopMode) -> Option<BroadcastWrite> {
+        let on_line = || standing.on_line(&self.line.name);
+        let is_meant =
+            |entry: &Arc<Entry>| self.members.iter().any(|(_, member)| Arc::ptr_eq(&member.entry, entry));
+        let write = |entry: &Arc<Entry>| {
+            let write = entry.broadcasts.iter().find(|(stop, _)| *stop == mode).map(|(_, write)| *write);
+            write.filter(|_| entry.settings().control && is_meant(entry))
+        };
+        let first = write(on_line().next()?)?;
+        let is_common = on_line().all(|entry| write(entry) == Some(first));
+        let under_way = |entry: &Arc<Entry>| entry.snapshots.borrow().stop.map(|stop| strength(stop.mode));
+        let (all, any) = on_line().map(under_way).fold((true, false), |(all, any), stop| {
+            (all && stop >= Some(strength(mode)), any || stop > Some(strength(mode)))
+        });
+        (is_common && !all && !any).then_some(first)
+    }
 }
 
 /// Waits until a drive that was started shows that it has reached its reference: that of the start, or the one that it

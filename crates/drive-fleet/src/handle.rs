@@ -4,7 +4,7 @@ use std::{
     fmt,
     pin::pin,
     sync::{
-        Arc, PoisonError, RwLock,
+        Arc, LazyLock, PoisonError, RwLock,
         atomic::{AtomicU64, Ordering},
     },
     time::Duration,
@@ -28,6 +28,7 @@ use crate::{
     outcome::{Order, Refused, Until},
     plan::Demand,
     progress::{Progress, refused},
+    round::Round,
     settings::{DriveSettings, Left},
     snapshot::{Snapshot, WatchdogCheck},
     stop_order::StopOrder,
@@ -130,7 +131,9 @@ impl fmt::Debug for DriveHandle {
 
 impl DriveHandle {
     pub(crate) fn new(entry: Arc<Entry>) -> Self {
-        Self { entry, act: Arc::new(Act::of("program")) }
+        /// Whoever does not say who he is, once for all drives: a stop of all takes a handle of each.
+        static PROGRAM: LazyLock<Arc<Act>> = LazyLock::new(|| Arc::new(Act::of("program")));
+        Self { entry, act: Arc::clone(&PROGRAM) }
     }
 
     /// This drive, commanded under a name: for the settings that say who may command it, and for the events. An [`Act`] says
@@ -295,14 +298,20 @@ impl DriveHandle {
     /// A stop under way that is as hard takes a later one in, which is confirmed by what the drive shows after it; one that is
     /// harder takes its place: freewheel, then fast, then injection of direct current, then the ramp.
     pub fn stop(&self, order: impl Into<StopOrder>) -> StopTicket {
-        self.stop_within(order.into(), None)
+        self.stop_within(order.into(), None, None)
     }
 
-    pub(crate) fn stop_within(&self, order: StopOrder, patience: Option<Duration>) -> StopTicket {
+    /// The same as one of several, with the time of its line.
+    pub(crate) fn stop_within(
+        &self,
+        order: StopOrder,
+        patience: Option<Duration>,
+        round: Option<Round>,
+    ) -> StopTicket {
         let (reply, hearer) = watch::channel(Progress::default());
         let (id, act) = (self.entry.new_call(), Arc::clone(&self.act));
         // One that cannot be given any more is refused by the end of its reply.
-        let _ = self.entry.urgent.send(Urgent::Stop { id, order, act, patience, reply });
+        let _ = self.entry.urgent.send(Urgent::Stop { id, order, act, patience, round, reply });
         StopTicket::new(hearer)
     }
 

@@ -62,6 +62,7 @@ mod message;
 mod outcome;
 mod plan;
 mod progress;
+mod round;
 mod runs;
 mod settings;
 mod shows;

@@ -12,6 +12,7 @@ use crate::{
     cause::{Act, Policy},
     outcome::{Order, Refused},
     progress::Report,
+    round::Round,
     settings::DriveSettings,
     snapshot::Snapshot,
     stop_order::StopOrder,
@@ -52,6 +53,8 @@ pub(crate) enum Urgent {
         act: Arc<Act>,
         /// Until its lack of confirmation is an alarm; `None`: as the settings say.
         patience: Option<Duration>,
+        /// Where it is one of several drives that are stopped.
+        round: Option<Round>,
         reply: Report,
     },
     /// The ticket of an order was dropped before its outcome was heard.
@@ -62,7 +65,7 @@ pub(crate) enum Urgent {
     /// name sees the end of it.
     Renamed(Arc<DriveSettings>, watch::Sender<Arc<Snapshot>>),
     /// The fleet shuts down, or the drive leaves it: by which policy it ends.
-    Exit(Policy),
+    Exit(Policy, Round),
     /// The time for shutting down is over.
     ExitTimeOver,
 }

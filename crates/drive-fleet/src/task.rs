@@ -9,6 +9,7 @@ use std::{
 
 use drive_bus::Slave;
 use drive_core::{Direction, Drive, Error, Lease, Lifetimes, Setpoint};
+use futures_util::future::poll_immediate;
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
     time::{Instant, sleep_until},
@@ -20,6 +21,7 @@ use crate::{
     message::{Message, Urgent},
     outcome::Refused,
     progress::Report,
+    round::Round,
     runs::Keeper,
     settings::{DriveSettings, Left, RunRecord},
     snapshot::Snapshot,
@@ -91,9 +93,11 @@ impl Task {
                 // It may turn the motor long before its driver has seen that it does: it is ours from now on.
                 desk.supervisor.handle_lease(Some(Lease::new(direction, word)));
             }
-            desk.publish();
             let (call, until) = match step {
-                Step::Finished => break,
+                Step::Finished => {
+                    desk.publish();
+                    break;
+                }
                 Step::Wait(until) => (None, Some(until)),
                 Step::Do { job, lifetime, until, .. } => {
                     let identity = desk.supervisor.says_what_it_is();
@@ -118,6 +122,17 @@ impl Task {
                     None => std::future::pending().await,
                 }
             });
+            // A stop waits for its line before anything is told of it.
+            let at_once = match step {
+                Step::Do { job: Job::Stop(_) | Job::Withdraw, .. } => poll_immediate(call.as_mut()).await,
+                _ => None,
+            };
+            desk.tell();
+            if let Some((reply, lease)) = at_once {
+                desk.supervisor.handle_lease(lease);
+                desk.supervisor.handle_reply(Instant::now(), reply);
+                continue;
+            }
             let mut timer = pin!(passing(until));
             // A stop is looked at before everything else, an order before the answer of a poll.
             loop {
@@ -174,12 +189,16 @@ impl Task {
                         desk.publish();
                         continue;
                     }
+                    () = all_are_given(&mut desk.round) => {
+                        desk.tell();
+                        continue;
+                    }
                 };
                 if drops || !talking {
                     desk.supervisor.handle_dropped(Instant::now());
                     break;
                 }
-                desk.publish();
+                desk.tell();
             }
             if on_turn {
                 drop(turn.take());
@@ -200,6 +219,14 @@ async fn changed(count: &mut watch::Receiver<u64>) {
 async fn passing(at: Option<Instant>) {
     match at {
         Some(at) => sleep_until(at).await,
+        None => std::future::pending().await,
+    }
+}
+
+/// Until each of the drives that are stopped together has been given its stop, and for ever where it is not one of several.
+async fn all_are_given(round: &mut Option<Round>) {
+    match round {
+        Some(round) => round.all_are_given().await,
         None => std::future::pending().await,
     }
 }
@@ -226,6 +253,8 @@ pub(crate) struct Desk {
     pub(crate) askers: BTreeMap<CallId, oneshot::Sender<Result<Told, Refused>>>,
     /// What the drive itself is to know of its settings from its next call on.
     pub(crate) settings: Option<Arc<DriveSettings>>,
+    /// The drive is stopped with others, and what is told of its stop waits for theirs.
+    pub(crate) round: Option<Round>,
 }
 
 impl Desk {
@@ -260,7 +289,8 @@ impl Desk {
     fn handle_urgent(&mut self, message: Urgent) -> bool {
         let now = Instant::now();
         match message {
-            Urgent::Stop { id, order, act, patience, reply } => {
+            Urgent::Stop { id, order, act, patience, round, reply } => {
+                self.round = round;
                 // A stop may be pending for hours; only those who still wait for it are kept.
                 self.callers.retain(|_, caller| !caller.is_closed());
                 let callers = &self.callers;
@@ -281,7 +311,10 @@ impl Desk {
                 (self.settings, self.snapshots) = (Some(settings), snapshots);
                 false
             }
-            Urgent::Exit(why) => self.supervisor.handle_exit(now, why),
+            Urgent::Exit(why, round) => {
+                self.round = Some(round);
+                self.supervisor.handle_exit(now, why)
+            }
             Urgent::ExitTimeOver => {
                 self.supervisor.handle_exit_time_over();
                 true
@@ -292,6 +325,18 @@ impl Desk {
     fn caller(&mut self, id: CallId, act: Arc<Act>, reply: Report) -> Asker {
         self.callers.insert(id, reply);
         Asker::Caller { id, act }
+    }
+
+    /// The same, where each drive that is stopped with this one has been given its stop; else it is told when they have, and no later than
+    /// what comes next.
+    fn tell(&mut self) {
+        match &mut self.round {
+            Some(round) if !round.is_given() => round.give(),
+            _ => {
+                self.round = None;
+                self.publish();
+            }
+        }
     }
 
     /// Tells what there is to tell: the snapshot first, so that who hears an outcome sees what it rests on.

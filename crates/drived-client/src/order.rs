@@ -143,8 +143,8 @@ fn pending(command: &CommandView) -> String {
         return format!("{} has not confirmed it yet: it goes on", name(command));
     };
     let drives = &several.drives;
-    let left = drives.iter().filter(|drive| drive.outcome == OutcomeWord::Pending).map(name);
-    let left: Vec<&str> = left.collect();
+    let left = drives.iter().filter(|drive| drive.outcome == OutcomeWord::Pending);
+    let left: Vec<&str> = left.map(|drive| name(drive)).collect();
     let confirmed = several.confirmed;
     format!("{confirmed} of {} have confirmed it, waiting for {}", drives.len(), left.join(", "))
 }

@@ -20,7 +20,7 @@ use super::{
 /// How long a connection may ask for nothing.
 const HEAD_WITHIN: Duration = Duration::from_secs(5);
 /// For how long one that nobody has heard yet is listened to when others want its place.
-const MOMENT: Duration = Duration::from_millis(200);
+const MOMENT: Duration = Duration::from_millis(500);
 /// The most that the head of a request may be.
 const HEAD: usize = 16 * 1024;
 const HEADERS: usize = 64;
@@ -52,7 +52,9 @@ pub(super) async fn serve<S, F>(
         .max_buf_size(HEAD)
         .serve_connection(TokioIo::new(Patient::new(stream, Arc::clone(&place))), service);
     let mut connection = pin!(connection);
+    // What has come is heard before anybody makes room.
     let makes_room = tokio::select! {
+        biased;
         // Whatever it ended by is the far end's affair.
         _ = connection.as_mut() => return,
         () = place.wanted() => true,

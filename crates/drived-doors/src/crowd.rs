@@ -45,7 +45,7 @@ impl Limits {
         per_address: 64,
         for_stops: 16,
         silent_for: Duration::ZERO,
-        moments: 64,
+        moments: 512,
         streams: 32,
         streams_per_address: 32,
     };

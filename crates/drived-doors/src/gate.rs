@@ -22,7 +22,9 @@ use hyper::body::Body as _;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::{
+    runtime::Handle,
     sync::watch,
+    task::JoinSet,
     time::{Instant, sleep, timeout},
 };
 use tower::ServiceExt as _;
@@ -39,6 +41,7 @@ use super::{
     pace::Pace,
     refusal::Refusal,
     sessions::{self, Sessions},
+    threads::Threads,
     token_desk,
     tokens::{self, Token, TokenError, Tokens},
 };
@@ -198,6 +201,7 @@ pub(super) struct Gate {
     pub(super) changes: watch::Sender<()>,
     /// True when the server ends.
     pub(super) end: watch::Receiver<bool>,
+    pub(super) threads: Threads,
 }
 
 impl Gate {
@@ -322,7 +326,8 @@ impl Gate {
         if reads {
             asking.is_whole();
             parts.extensions.insert(caller);
-            return self.route(Request::from_parts(parts, Body::empty())).await;
+            let request = Request::from_parts(parts, Body::empty());
+            return self.route(request, Some(&self.threads.readings)).await;
         }
         if logs_in {
             return self.log_in(door, peer, caller, &read(LOGIN_BODY).await?).await;
@@ -359,14 +364,28 @@ impl Gate {
         }
         let answered = record(Kind::Answer);
         parts.extensions.insert(caller);
-        let answer = self.route(Request::from_parts(parts, Body::from(body))).await;
+        let elsewhere = (!stops).then_some(&self.threads.commands);
+        let answer = self.route(Request::from_parts(parts, Body::from(body)), elsewhere).await;
         self.audited(answered, answer).await
     }
 
-    async fn route(&self, request: Request<Body>) -> Result<Response, Refusal> {
-        match timeout(ANSWERED_WITHIN, self.router.clone().oneshot(request)).await {
-            Ok(Ok(answer)) => Ok(answer),
-            Ok(Err(never)) => match never {},
+    /// Has the router answer, here and at once or elsewhere.
+    async fn route(&self, request: Request<Body>, elsewhere: Option<&Handle>) -> Result<Response, Refusal> {
+        let answer = self.router.clone().oneshot(request);
+        let answered = async {
+            let Some(elsewhere) = elsewhere else { return Some(answer.await) };
+            // It ends with whoever asks.
+            let mut one = JoinSet::new();
+            one.spawn_on(answer, elsewhere);
+            one.join_next().await?.ok()
+        };
+        match timeout(ANSWERED_WITHIN, answered).await {
+            Ok(Some(Ok(answer))) => Ok(answer),
+            Ok(Some(Err(never))) => match never {},
+            Ok(None) => Err(Refusal::new(
+                StatusCode::INTERNAL_SERVER_ERROR,
+                "this cannot be answered: see the log of the daemon",
+            )),
             Err(_) => Err(Refusal::new(
                 StatusCode::GATEWAY_TIMEOUT,
                 "no answer in time: nobody knows what became of it",

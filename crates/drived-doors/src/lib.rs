@@ -32,6 +32,7 @@ mod sessions;
 mod socket;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
+mod threads;
 #[cfg_attr(not(feature = "tls"), path = "no_tls.rs")]
 mod tls;
 mod token_desk;
@@ -70,6 +71,7 @@ use self::{
     gate::{Door, Gate, Peer},
     host::Hosts,
     sessions::Sessions,
+    threads::Own,
     tls::Tls,
     tokens::{Right, Tokens},
 };
@@ -110,6 +112,7 @@ pub struct Doors {
     codes: Codes,
     page: Arc<OnceLock<String>>,
     has_tokens: bool,
+    _threads: Own,
 }
 
 /// Doors that only have to be opened: what they need has been found.
@@ -189,6 +192,8 @@ impl Prepared {
         let (listens, listening) = watch::channel(self.http.is_none());
         let Self { tokens, audit, sessions, .. } = self;
         let (failures, refused, pace, changes) = Default::default();
+        let (threads, own) = Own::start();
+        let doors = threads.doors.clone();
         let (codes, page, has_tokens) =
             (Codes::default(), Arc::<OnceLock<String>>::default(), tokens.is_some());
         let gate = Gate {
@@ -204,17 +209,27 @@ impl Prepared {
             pace,
             changes,
             end: end.clone(),
+            threads,
         };
+        // What was listened on before is heard there from now on.
+        let _there = doors.enter();
         let shared = Shared { gate: Arc::new(gate), end, _here: here };
         audit.record(Record::of_program(Kind::Daemon, "the daemon serves")).whenever();
         #[cfg(unix)]
         if let Some(entrance) = self.socket {
-            tokio::spawn(until_the_end(shared.clone(), entrance.serve_all(shared.clone())));
+            match entrance.heard_here() {
+                Ok(entrance) => {
+                    doors.spawn(until_the_end(shared.clone(), entrance.serve_all(shared.clone())));
+                }
+                Err(error) => tracing::error!("nobody can be heard on the control socket: {error}"),
+            }
         }
         if let Some(door) = self.http {
-            tokio::spawn(until_the_end(shared.clone(), serve_http(door, listens, shared)));
+            let listener = door.listener.and_then(|listener| heard_here(listener).ok());
+            let door = HttpDoor { listener, ..door };
+            doors.spawn(until_the_end(shared.clone(), serve_http(door, listens, shared)));
         }
-        Doors { ended, gone, listening, audit, codes, page, has_tokens }
+        Doors { ended, gone, listening, audit, codes, page, has_tokens, _threads: own }
     }
 }
 
@@ -315,6 +330,11 @@ pub async fn listen(address: SocketAddr) -> TcpListener {
     }
 }
 
+/// The same, heard by the runtime in which this is called.
+fn heard_here(listener: TcpListener) -> io::Result<TcpListener> {
+    TcpListener::from_std(listener.into_std()?)
+}
+
 fn bound(address: SocketAddr) -> io::Result<TcpListener> {
     let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
     // An address that was served a moment ago may be served again; elsewhere than on Unix that means something else.
@@ -367,6 +387,16 @@ impl Entrance {
         };
         let (listener, crowd) = (Listener::Unix(socket), Crowd::new(Limits::SOCKET));
         Ok(Some(Self { name: "the control socket", listener, door: Arc::new(door), crowd }))
+    }
+
+    /// The same, heard by the runtime in which this is called.
+    #[cfg(unix)]
+    fn heard_here(self) -> io::Result<Self> {
+        let listener = match self.listener {
+            Listener::Tcp(listener, tls) => Listener::Tcp(heard_here(listener)?, tls),
+            Listener::Unix(socket) => Listener::Unix(socket.heard_here()?),
+        };
+        Ok(Self { listener, ..self })
     }
 
     /// Accepts connections for ever, and serves each on a task of its own. When the system has no room for one more, such

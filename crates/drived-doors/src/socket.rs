@@ -2,9 +2,12 @@
 
 use std::{
     env, fs, io,
-    os::unix::{
-        fs::{FileTypeExt as _, PermissionsExt as _},
-        net::UnixStream,
+    os::{
+        fd::AsFd as _,
+        unix::{
+            fs::{FileTypeExt as _, PermissionsExt as _},
+            net::UnixStream,
+        },
     },
     path::{Path, PathBuf},
 };
@@ -78,6 +81,15 @@ impl Socket {
         let socket = Self { listener, path: path.to_owned() };
         fs::set_permissions(path, fs::Permissions::from_mode(mode)).map_err(of)?;
         Ok(socket)
+    }
+
+    /// The same, heard by the runtime in which this is called.
+    pub(super) fn heard_here(mut self) -> io::Result<Self> {
+        // What stands at the place stays there.
+        let place = std::mem::take(&mut self.path);
+        let there = self.listener.as_fd().try_clone_to_owned()?;
+        let listener = UnixListener::from_std(there.into())?;
+        Ok(Self { listener, path: place })
     }
 }
 

@@ -92,6 +92,7 @@ impl Rig {
             pace,
             changes,
             end: ended,
+            threads: threads::Threads::of_this_runtime(),
         });
         Self { gate, door, crowd: Crowd::new(crowd::Limits::HTTP), end, folder }
     }

@@ -759,3 +759,37 @@ async fn a_null_in_what_is_asked_of_tokens_is_refused_with_the_name_of_its_key()
     let listed = rig.ask_on_socket(&Asked { path: TOKENS, ..STATE }).await.body;
     assert!(!listed.contains("panel"), "{listed}");
 }
+
+#[tokio::test]
+async fn a_stop_is_carried_out_while_every_thread_that_answers_readings_is_busy() {
+    let mut rig = Rig::new("busy");
+    let (threads, _own) = threads::Own::start();
+    let (release, held) = std::sync::mpsc::channel::<()>();
+    let (held, begun) = (Arc::new(std::sync::Mutex::new(held)), Arc::new(tokio::sync::Notify::new()));
+    let begins = Arc::clone(&begun);
+    let busy = move || {
+        let (held, begins) = (Arc::clone(&held), Arc::clone(&begins));
+        async move {
+            begins.notify_one();
+            // As whoever makes a large answer: its thread does nothing else.
+            let _ = held.lock().map(|held| held.recv_timeout(Duration::from_secs(2)));
+        }
+    };
+    let gate = Arc::get_mut(&mut rig.gate).unwrap();
+    gate.router = gate.router.clone().route("/api/v1/busy", axum::routing::get(busy));
+    gate.threads = threads;
+    let rig = Arc::new(rig);
+    let reads: Vec<_> = (0..2 * std::thread::available_parallelism().unwrap().get())
+        .map(|_| {
+            let rig = Arc::clone(&rig);
+            tokio::spawn(async move { rig.ask(&Asked { path: "/api/v1/busy", ..STATE }).await.status })
+        })
+        .collect();
+    begun.notified().await;
+    assert_eq!(rig.ask(&STOP).await.status, StatusCode::OK);
+    assert!(reads.iter().all(|read| !read.is_finished()), "it waited for who reads");
+    drop(release);
+    for read in reads {
+        assert_eq!(read.await.unwrap(), StatusCode::OK);
+    }
+}

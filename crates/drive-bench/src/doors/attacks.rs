@@ -26,6 +26,8 @@ pub(super) struct Target {
     pub(super) socket: PathBuf,
     /// By which somebody may operate.
     pub(super) token: String,
+    /// The audit log of the daemon.
+    pub(super) audit: PathBuf,
 }
 
 /// What somebody does until it is over.
@@ -121,7 +123,8 @@ fn flood(to: SocketAddr, count: usize, request: &str, over: &AtomicBool) -> Vec<
     Vec::new()
 }
 
-fn connect(to: SocketAddr) -> std::io::Result<TcpStream> {
+/// A connection from the address of attackers on which nothing lasts for ever.
+pub(super) fn connect(to: SocketAddr) -> std::io::Result<TcpStream> {
     let socket = Socket::new(Domain::IPV4, Type::STREAM, None)?;
     socket.bind(&SocketAddr::new(ATTACKER, 0).into())?;
     socket.connect_timeout(&to.into(), PATIENCE)?;

@@ -48,12 +48,14 @@ impl Size {
 /// The group and the edge node as which it is known to hosts of Sparkplug.
 pub(super) const GROUP: &str = "bench";
 pub(super) const EDGE_NODE: &str = "bench";
+/// The folder of what outlives the daemon, in its own.
+const STATE: &str = "state";
 /// Drives that can be commanded are called so, with their address behind.
 pub(super) const PUMP: &str = "pump";
 
 /// A daemon with simulated drives and all its doors, in a folder of its own.
 pub(super) struct Plant {
-    _folder: Folder,
+    folder: Folder,
     pub(super) http: SocketAddr,
     pub(super) gateway: SocketAddr,
     pub(super) socket: PathBuf,
@@ -72,7 +74,8 @@ impl Plant {
     /// Whom an attack meets.
     pub(super) fn target(&self) -> Target {
         let (socket, token) = (self.socket.clone(), self.token.clone());
-        Target { http: self.http, gateway: self.gateway, socket, token }
+        let audit = self.folder.0.join(STATE).join("audit");
+        Target { http: self.http, gateway: self.gateway, socket, token, audit }
     }
 
     /// How often a drive at rest is asked.
@@ -119,7 +122,7 @@ impl Plant {
                 "state = {:?}\n[http]\nlisten = \"{http}\"\n[socket]\npath = {socket:?}\n{mqtt}[lines.bench]\nport = {link:?}\n\
                  {}{watched}\
                  [[gateways]]\nlisten = \"{gateway}\"\nline = \"bench\"\nclients = {clients}\nwrites = \"{writes}\"\n",
-                folder.0.join("state"),
+                folder.0.join(STATE),
                 drives(1..=commanded, PUMP, true),
             ),
         )?;
@@ -138,18 +141,7 @@ impl Plant {
         let process = daemon.0.id();
         let running = [drives, daemon].into_iter().chain(mosquitto).collect();
         let queue = Queue::of(log);
-        Ok(Self {
-            _folder: folder,
-            http,
-            gateway,
-            socket,
-            broker,
-            queue,
-            size,
-            token,
-            process,
-            _running: running,
-        })
+        Ok(Self { folder, http, gateway, socket, broker, queue, size, token, process, _running: running })
     }
 }
 

@@ -33,6 +33,9 @@ pub(super) struct File {
     /// `None`: its lines have no seal, and nothing says how it ends.
     key: Option<Key>,
     last: Option<Head>,
+    /// How often the disk was waited for.
+    #[cfg(test)]
+    pub(super) waits: u32,
 }
 
 /// How a log ends, and how it begins: by this it is known where one was cut.
@@ -76,14 +79,26 @@ impl File {
         let key = Key::of_or_new(&kept)?;
         // One that says nothing any more is found by who looks whether it is whole.
         let last = Head::of(&kept, &key).ok().flatten();
-        Ok(Self { kept, largest: LARGEST, aside: KEPT, key: Some(key), last })
+        Ok(Self { last, ..Self::of(kept, LARGEST, KEPT, Some(key)) })
+    }
+
+    const fn of(kept: Kept, largest: u64, aside: u32, key: Option<Key>) -> Self {
+        Self {
+            kept,
+            largest,
+            aside,
+            key,
+            last: None,
+            #[cfg(test)]
+            waits: 0,
+        }
     }
 
     /// The file of what was refused.
     pub(super) fn open_refused(path: &Path) -> io::Result<Self> {
         let kept = Kept::at(path);
         kept.open_to_append()?;
-        Ok(Self { kept, largest: LARGEST_REFUSED, aside: 1, key: None, last: None })
+        Ok(Self::of(kept, LARGEST_REFUSED, 1, None))
     }
 
     /// The newest line, by its number and its SHA-256.
@@ -91,8 +106,13 @@ impl File {
         self.last.as_ref().map_or_else(String::new, |head| format!("{}-{}", head.number, head.last))
     }
 
-    /// Appends a record and waits until the disk has it. What was written of a record that failed is taken back.
+    /// Appends a record and waits until the disk has it.
     pub(super) fn append(&mut self, record: &Record) -> io::Result<()> {
+        self.append_all([record])
+    }
+
+    /// Appends records in their order and waits once until the disk has them all. Of those that could not all be written none is there.
+    pub(super) fn append_all<'a>(&mut self, records: impl IntoIterator<Item = &'a Record>) -> io::Result<()> {
         let mut file = self.locked()?;
         // Another program may have written since.
         let mut head = match &self.key {
@@ -109,7 +129,7 @@ impl File {
         let length = file.metadata()?.len();
         let last = last_line(&mut file)?;
         // A line that was torn by a crash stays, and stays in the chain.
-        let mut line =
+        let mut lines =
             if last.as_ref().is_some_and(|last| !last.is_whole) { "\n".to_owned() } else { String::new() };
         let mut aside = if last.is_none() { aside(&self.kept, 1).open()? } else { None };
         let before = match &mut aside {
@@ -117,29 +137,38 @@ impl File {
             None => last,
         };
         let known = head.as_ref().map_or(0, |head| head.number);
-        let (previous, number) = match &before {
+        let (mut previous, before) = match &before {
             Some(last) => {
                 let number = number_of(&last.bytes)
                     .map_or_else(|| last_number(aside.as_mut().unwrap_or(&mut file)), Ok)?;
-                (sha256(&last.bytes), number.max(known) + 1)
+                (sha256(&last.bytes), number.max(known))
             }
             // Whoever has emptied it has not made it new.
-            None => (head.as_ref().map_or_else(|| FIRST.to_owned(), |head| head.last.clone()), known + 1),
+            None => (head.as_ref().map_or_else(|| FIRST.to_owned(), |head| head.last.clone()), known),
         };
-        let object =
-            drived_words::json::line(&Line { number, time_unix_ms: unix_ms(), record, previous: &previous });
-        let object = self.key.as_ref().map_or_else(|| object.clone(), |key| key.sealed(&object));
-        line.push_str(&object);
-        line.push('\n');
-        let written = file.write_all(line.as_bytes()).and_then(|()| file.sync_data());
+        let mut number = before;
+        for record in records {
+            number += 1;
+            let line = Line { number, time_unix_ms: unix_ms(), record, previous: &previous };
+            let object = drived_words::json::line(&line);
+            let object = self.key.as_ref().map_or_else(|| object.clone(), |key| key.sealed(&object));
+            previous = sha256(object.as_bytes());
+            lines.push_str(&object);
+            lines.push('\n');
+        }
+        #[cfg(test)]
+        {
+            self.waits += 1;
+        }
+        let written = file.write_all(lines.as_bytes()).and_then(|()| file.sync_data());
         if written.is_err() {
-            // A record is there whole or not at all. Where even this fails, the next program finds a torn line.
+            // They are there whole or not at all. Where even this fails, the next program finds a torn line.
             let _ = file.set_len(length);
             return written;
         }
         if let Some(key) = &self.key {
-            let first = head.map_or(number, |head| head.first);
-            let head = Head { number, last: sha256(object.as_bytes()), first };
+            let first = head.map_or(before + 1, |head| head.first);
+            let head = Head { number, last: previous, first };
             // The last that could be written is still true.
             let _ = head.write(&self.kept, key);
             self.last = Some(head);
@@ -275,6 +304,21 @@ mod tests {
         assert_eq!(numbers, [1, 2, 3].map(Some));
         assert!(!lines[0].contains('\u{1b}'), "{}", lines[0]);
         assert!(matches!(verify(&path).unwrap(), Verdict::Unbroken { records: 3, torn: 0, .. }));
+    }
+
+    #[test]
+    fn records_that_are_written_together_are_a_chain_as_if_each_were_alone() {
+        let folder = Folder::new("together");
+        let path = folder.file("audit");
+        let mut file = File::open(&path).unwrap();
+        file.append(&record("one")).unwrap();
+        let together = ["two", "three", "four"].map(record);
+        file.append_all(&together).unwrap();
+        file.append(&record("five")).unwrap();
+        assert!(matches!(verify(&path).unwrap(), Verdict::Unbroken { records: 5, torn: 0, .. }));
+        let numbers: Vec<_> = lines(&path).iter().map(|line| number_of(line.as_bytes())).collect();
+        assert_eq!(numbers, [1, 2, 3, 4, 5].map(Some));
+        assert_eq!(file.head().split('-').next(), Some("5"));
     }
 
     #[test]

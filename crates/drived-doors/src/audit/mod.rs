@@ -39,6 +39,8 @@ use drived_config::{
 
 /// Records that wait for the disk.
 const WAITING: usize = 256;
+/// Of these, outcomes that nobody waits for.
+const OUTCOMES_AHEAD: usize = WAITING / 4;
 /// From one try to write a gap to the next.
 const TRIED_AGAIN: Duration = Duration::from_secs(1);
 /// How often the newest line is told in the program's log, where it is out of reach of who has the file.
@@ -186,14 +188,14 @@ impl Audit {
     pub fn open(path: &Path) -> Result<Self, String> {
         let failed =
             |error: std::io::Error| format!("the audit log {} cannot be written: {error}", path.display());
-        let file = File::open(path).map_err(failed)?;
+        let mut file = File::open(path).map_err(failed)?;
         let aside = File::open_refused(Kept::at(path).beside(REFUSED).path()).map_err(failed)?;
         let (waiting, records) = sync_channel(WAITING);
         let (refused, refusals) = sync_channel(WAITING);
         let shared = Arc::<Shared>::default();
         let of_writer = Arc::clone(&shared);
         // A disk may take as long as it likes: no thread of the runtime waits for it.
-        std::thread::spawn(move || write_all(file, &records, &of_writer));
+        std::thread::spawn(move || write_all(&mut file, &records, &of_writer));
         std::thread::spawn(move || write_refused(aside, &refusals));
         Ok(Self { waiting: Some(waiting), refused: Some(refused), shared })
     }
@@ -247,6 +249,7 @@ impl Written {
 
 /// Writes what becomes of each command at its drive until the fleet ends: also of one whose caller did not wait for it.
 pub(super) async fn follow(audit: Audit, names: Names, mut events: Events) {
+    let mut ahead = 0;
     loop {
         let Event { drive, kind, .. } = match events.recv().await {
             Received::Event(event) => event,
@@ -274,12 +277,18 @@ pub(super) async fn follow(audit: Audit, names: Names, mut events: Events) {
         let id = Some(names.known_as(names::Kind::Drive, &drive).id);
         let record =
             Record { drive: id, outcome: Some(outcome), ..Record::new(Kind::Outcome, &caller, what) };
-        // Where it cannot be written that is told by whoever writes.
-        let _ = audit.record(record).done().await;
+        let written = audit.record(record);
+        // So many are handed on before the disk is waited for: they are written in their order.
+        ahead = (ahead + 1) % OUTCOMES_AHEAD;
+        match ahead {
+            // Where it cannot be written that is told by whoever writes.
+            0 => drop(written.done().await),
+            _ => written.whenever(),
+        }
     }
 }
 
-fn write_all(mut file: File, records: &Receiver<Waiting>, shared: &Shared) {
+fn write_all(file: &mut File, records: &Receiver<Waiting>, shared: &Shared) {
     let mut told: Option<(String, SystemTime)> = None;
     loop {
         let has_gap = !shared.gap().is_empty();
@@ -288,21 +297,26 @@ fn write_all(mut file: File, records: &Receiver<Waiting>, shared: &Shared) {
             false => records.recv().map_err(|_| RecvTimeoutError::Disconnected),
         };
         // What is missing stands before what comes after it.
-        let closed = close_gap(&mut file, shared);
-        let (record, done) = match next {
+        let closed = close_gap(file, shared);
+        let next = match next {
             Ok(waiting) => waiting,
             Err(RecvTimeoutError::Timeout) => continue,
             Err(RecvTimeoutError::Disconnected) => return,
         };
-        let written = closed.and_then(|()| file.append(&record));
+        // The disk is waited for once for all that wait by now: each command waits for it before it moves anything.
+        let together: Vec<Waiting> = std::iter::once(next).chain(records.try_iter().take(WAITING)).collect();
+        let written = closed.and_then(|()| file.append_all(together.iter().map(|(record, _)| record)));
         if let Err(error) = &written {
-            shared.lose(&record, error);
+            together.iter().for_each(|(record, _)| shared.lose(record, error));
         }
         let head = file.head();
         shared.head.send_replace(Some(head.clone()).filter(|head| !head.is_empty()));
-        let _ = done.send(written.map_err(|_| NotWritten));
+        let is_of_daemon = together.iter().any(|(record, _)| record.kind == Kind::Daemon);
+        for (_, done) in together {
+            let _ = done.send(written.as_ref().map_err(|_| NotWritten).copied());
+        }
         let is_due = |at: &SystemTime| at.elapsed().is_ok_and(|age| age >= HEAD_TOLD_EVERY);
-        if record.kind == Kind::Daemon || told.as_ref().is_none_or(|(_, at)| is_due(at)) {
+        if is_of_daemon || told.as_ref().is_none_or(|(_, at)| is_due(at)) {
             if told.as_ref().is_none_or(|(last, _)| *last != head) {
                 tracing::info!("the audit log ends with {head}: drived audit verify --since {head}");
             }
@@ -351,4 +365,32 @@ pub fn write_one(path: &Path, record: &Record) -> std::io::Result<()> {
 fn unix_ms() -> u64 {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     drived_words::json::milliseconds(now)
+}
+
+#[cfg(test)]
+mod tests {
+    use drived_config::testing::Folder;
+
+    use super::*;
+
+    #[test]
+    fn records_that_wait_at_once_wait_for_the_disk_once() {
+        let folder = Folder::new("at-once");
+        let path = folder.file("audit");
+        let mut file = File::open(&path).unwrap();
+        let (waiting, records) = sync_channel(WAITING);
+        let written: Vec<_> = (0..100)
+            .map(|number| {
+                let (done, written) = oneshot::channel();
+                let record = Record::of_program(Kind::Command, format!("command {number}"));
+                waiting.try_send((record, done)).unwrap();
+                written
+            })
+            .collect();
+        drop(waiting);
+        write_all(&mut file, &records, &Shared::default());
+        assert_eq!(file.waits, 1);
+        assert!(written.into_iter().all(|written| written.blocking_recv() == Ok(Ok(()))));
+        assert!(matches!(verify(&path).unwrap(), Verdict::Unbroken { records: 100, .. }));
+    }
 }

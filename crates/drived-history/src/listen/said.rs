@@ -111,9 +111,9 @@ fn in_words(command: &CommandView) -> String {
     let of = match (&command.group, &command.several) {
         (Some(group), _) => format!(" of group {group}"),
         (None, Some(several)) if !command.selected.is_empty() => {
-            format!(" of {} drives that were selected", several.drives.len())
+            format!(" of {} drives that were selected", several.count())
         }
-        (None, Some(several)) => format!(" of all {} drives", several.drives.len()),
+        (None, Some(several)) => format!(" of all {} drives", several.count()),
         (None, None) => String::new(),
     };
     let why = command.text.as_ref().map(|text| format!(": {text}")).unwrap_or_default();

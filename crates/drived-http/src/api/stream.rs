@@ -49,11 +49,28 @@ pub(super) async fn events(
     Ok((headers, body).into_response())
 }
 
+/// What is written at once to a reader: for each write of so many streams the doors ask the system.
+const AT_ONCE: usize = 16 << 10;
+
+/// The next frames, as many as are written at once.
+fn together(frames: &mut VecDeque<Bytes>) -> Option<Bytes> {
+    let first = frames.pop_front()?;
+    if frames.front().is_none_or(|next| first.len() + next.len() > AT_ONCE) {
+        return Some(first);
+    }
+    let mut all = Vec::from(first);
+    while let Some(next) = frames.front().filter(|next| all.len() + next.len() <= AT_ONCE) {
+        all.extend_from_slice(next);
+        frames.pop_front();
+    }
+    Some(all.into())
+}
+
 /// How far one stream has come.
 struct Told {
     plant: Plant,
     reader: Reader,
-    /// What is to be sent, one at a time: nothing is taken for a reader who does not read.
+    /// What is to be sent, a little at a time: nothing is taken for a reader who does not read.
     frames: VecDeque<Bytes>,
     is_over: bool,
 }
@@ -61,8 +78,8 @@ struct Told {
 impl Told {
     async fn next(mut self) -> Option<(Result<Bytes, Infallible>, Self)> {
         loop {
-            if let Some(frame) = self.frames.pop_front() {
-                return Some((Ok(frame), self));
+            if let Some(frames) = together(&mut self.frames) {
+                return Some((Ok(frames), self));
             }
             if self.is_over {
                 return None;
@@ -76,5 +93,19 @@ impl Told {
                 Next::End => return None,
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_that_wait_are_written_together_in_their_order_as_far_as_they_go() {
+        let large = Bytes::from(vec![b'x'; AT_ONCE]);
+        let mut frames =
+            VecDeque::from([Bytes::from("a"), "b".into(), "c".into(), large.clone(), "d".into()]);
+        let all: Vec<_> = std::iter::from_fn(|| together(&mut frames)).collect();
+        assert_eq!(all, [Bytes::from("abc"), large, "d".into()]);
     }
 }

@@ -12,7 +12,7 @@ use tokio::{sync::watch, time::Instant};
 use super::{
     Inner, Plant,
     commands::{ActionWord, OutcomeWord},
-    views::CommandView,
+    views::{CommandView, SeveralView},
 };
 use drived_words::json::unix;
 
@@ -68,10 +68,10 @@ impl Plant {
 }
 
 impl Inner {
-    /// Notes what became of a command, for each drive that it was for.
-    pub(super) fn note_last_commands(&self, command: &CommandView) {
-        let several = command.several.iter().flat_map(|several| &several.drives);
-        for part in std::iter::once(command).chain(several) {
+    /// Notes what became of a command, for each drive that it was for and of which something is new.
+    pub(super) fn note_last_commands(&self, command: &CommandView, before: Option<&SeveralView>) {
+        let news = command.several.iter().flat_map(|several| several.news(before));
+        for part in std::iter::once(command).chain(news.map(|part| &**part)) {
             if let Some(drive) = &part.drive {
                 self.note_last_command(drive, LastCommandView::of(part));
             }

@@ -29,6 +29,7 @@ use drive_bus::Line;
 use drive_families::Options;
 use drive_fleet::{DriveHandle, Fleet};
 use tokio::{
+    runtime::Handle,
     sync::{Mutex, watch},
     time::Instant,
 };
@@ -76,6 +77,8 @@ struct Inner {
     /// When a stop was last asked of each drive.
     stopped: Stopped,
     pulse: Pulse,
+    /// Where commands go on, whoever has given them.
+    runtime: Handle,
     /// One group starts at a time.
     group_starts: Mutex<()>,
     revisions: Revisions,
@@ -116,6 +119,7 @@ impl Plant {
             commands: Log::default(),
             stopped: Stopped::default(),
             pulse: Pulse::new(),
+            runtime: Handle::current(),
             group_starts: Mutex::default(),
             revisions: Revisions::new(),
             history: History::default(),

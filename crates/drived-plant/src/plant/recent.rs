@@ -13,11 +13,13 @@ use serde::{Deserialize, Serialize};
 use super::{
     Inner,
     revisions::Subject,
-    views::{CommandView, HappenedView, NoticeView, SeveralView},
+    views::{CommandView, HappenedView, NoticeView},
 };
 
 /// How many are kept.
 const KEPT: usize = 500;
+/// Of how many drives of a command the event stream tells at once: no revision is larger than what is kept of all.
+const TOLD_AT_ONCE: usize = 256;
 
 /// The last events of a plant.
 #[derive(Default)]
@@ -98,13 +100,20 @@ impl Inner {
         }
     }
 
-    /// Tells a command as it is now.
-    pub(super) fn tell_command(&self, command: &CommandView) {
-        self.note_last_commands(command);
-        let revision = self.revisions.push(Subject::Command, command);
-        let several = command.several.as_ref();
-        let several = several.map(|several| SeveralView { drives: Vec::new(), ..several.clone() });
-        let brief = CommandView { status: None, several, ..command.clone() };
+    /// Tells a command as it is now, where it was told so before.
+    pub(super) fn tell_command(&self, command: &CommandView, before: Option<&CommandView>) {
+        let before = before.and_then(|before| before.several.as_ref());
+        self.note_last_commands(command, before);
+        let brief = CommandView { several: None, ..command.clone() };
+        let counts = |drives| command.several.as_ref().map(|several| several.counts(drives));
+        let revision = match &command.several {
+            Some(several) if several.count() > TOLD_AT_ONCE => {
+                let news = several.news(before).take(TOLD_AT_ONCE).cloned().collect();
+                self.revisions.push(Subject::Command, &CommandView { several: counts(news), ..brief.clone() })
+            }
+            _ => self.revisions.push(Subject::Command, command),
+        };
+        let brief = CommandView { status: None, several: counts(Vec::new()), ..brief };
         self.recent.keep(RecentView { revision, what: Happened::Command(Box::new(brief)) });
     }
 
@@ -137,5 +146,53 @@ impl Inner {
         );
         let commanders = self.recent.commanders.lock().unwrap_or_else(PoisonError::into_inner);
         is_asked_for && commanders.contains(&**commander)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use serde_json::Value;
+
+    use super::*;
+    use crate::plant::{
+        commands::OutcomeWord,
+        revisions::{Next, data_of},
+        testing::TestPlant,
+        views::SeveralView,
+    };
+
+    fn command(drive: Option<String>, several: Option<SeveralView>) -> CommandView {
+        let told = serde_json::json!({
+            "id": "a", "drive": drive, "action": "stop", "command": "ramp stop", "caller": "local", "origin": "test",
+            "outcome": "pending", "open": true, "time_unix_ms": 1,
+        });
+        CommandView { several, ..serde_json::from_value(told).unwrap() }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn of_very_many_drives_the_event_stream_tells_those_of_which_something_is_new() {
+        let plant = TestPlant::of(1).await.plant;
+        let drives = 2 * TOLD_AT_ONCE;
+        let name = |number: usize| Some(format!("pump {number}"));
+        let mut parts: Vec<_> = (0..drives).map(|number| Arc::new(command(name(number), None))).collect();
+        let mut reader = plant.revisions().reader(None);
+        let first = command(None, Some(SeveralView::of(&mut parts, |_| false)));
+        plant.0.tell_command(&first, None);
+        Arc::make_mut(&mut parts[7]).outcome = OutcomeWord::Confirmed;
+        let second = command(None, Some(SeveralView::of(&mut parts, |_| false)));
+        plant.0.tell_command(&second, Some(&first));
+        let mut told = Vec::new();
+        while told.len() < 2 {
+            let Next::Frames(frames) = plant.revisions().next(&mut reader).await else { panic!("frames") };
+            let commands = frames.iter().filter_map(|frame| data_of(frame, Subject::Command));
+            told.extend(commands.map(|(_, data)| serde_json::from_slice::<Value>(data).unwrap()));
+        }
+        assert_eq!(told[0]["drives"].as_array().map(Vec::len), Some(TOLD_AT_ONCE));
+        assert_eq!((&told[0]["pending"], &told[0]["confirmed"]), (&drives.into(), &0.into()));
+        assert_eq!(told[1]["drives"].as_array().map(Vec::len), Some(1));
+        assert_eq!(told[1]["drives"][0]["drive"], "pump 7");
+        assert_eq!((&told[1]["pending"], &told[1]["confirmed"]), (&(drives - 1).into(), &1.into()));
     }
 }

@@ -189,10 +189,17 @@ impl Watched {
         }
     }
 
-    /// A drive is to be stopped by somebody.
-    pub(super) fn stop(&self, drive: &str) {
-        if let Some(watch) = self.lock().get_mut(drive) {
-            watch.is_stopped = true;
+    /// These drives are to be stopped by somebody.
+    pub(super) fn stop(&self, drives: &[DriveHandle]) {
+        let mut watched = self.lock();
+        // Nearly always nobody is watched, and a stop of all is for thousands.
+        if watched.is_empty() {
+            return;
+        }
+        for drive in drives {
+            if let Some(watch) = watched.get_mut(&**drive.name()) {
+                watch.is_stopped = true;
+            }
         }
     }
 

@@ -1,58 +1,33 @@
 //! As many clients of a gateway as there can be, each asking again as soon as it is answered.
 
-use std::{
-    net::SocketAddr,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
-    time::Duration,
-};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
     net::TcpStream,
-    time::{sleep, timeout},
+    time::sleep,
 };
 
-use super::{Got, Tally, all, connect};
-use crate::doors::{PATIENCE, attacks::Target, plant::Size};
+use super::{
+    Got, Tally, all,
+    client::{AGAIN, Client},
+};
+use crate::doors::{attacks::Target, plant::Size};
 
 const ANSWERED: &str = "reads answered";
 
 pub(super) fn ask(to: &Target, over: &AtomicBool) -> Vec<Got> {
     let gateway = to.gateway;
-    all(0..Size::FULL.clients, over, ANSWERED, |number, over| client(number, gateway, over))
-}
-
-async fn client(number: u16, gateway: SocketAddr, over: Arc<AtomicBool>) -> Tally {
-    let mut tally = Tally::default();
-    let mut kept: Option<TcpStream> = None;
-    while !over.load(Ordering::Relaxed) {
-        let mut open = match kept.take() {
-            Some(open) => open,
-            None => match connect(number, gateway).await {
-                Ok(open) => open,
-                Err(_) => {
-                    tally.count("could not connect");
-                    sleep(Duration::from_millis(100)).await;
-                    continue;
-                }
-            },
-        };
-        match timeout(PATIENCE, one(&mut open, number)).await {
-            Err(_) => tally.count("without an answer within 5 s"),
-            Ok(Err(_)) => {
-                tally.count("connections that were closed");
-                sleep(Duration::from_millis(100)).await;
-            }
-            Ok(Ok(what)) => {
-                tally.count(what);
-                kept = Some(open);
+    all(0..Size::FULL.clients, over, ANSWERED, |number, over| async move {
+        let (mut tally, mut client) = (Tally::default(), Client::new(number, gateway));
+        while !over.load(Ordering::Relaxed) {
+            match client.ask("reads", &mut tally, async |open| one(open, number).await).await {
+                Some(what) => tally.count(what),
+                None => sleep(AGAIN).await,
             }
         }
-    }
-    tally
+        tally
+    })
 }
 
 /// Four registers from ETA on (BBV51701 p. 21), each client of a drive of its own as far as there are drives.

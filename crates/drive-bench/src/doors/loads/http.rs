@@ -10,6 +10,8 @@ pub(super) struct Answer {
     pub(super) status: u16,
     /// Why, in one word, where it says so.
     pub(super) reason: Option<String>,
+    /// The name of the command that it is about.
+    pub(super) id: Option<String>,
 }
 
 impl Answer {
@@ -44,8 +46,11 @@ impl Answers {
         let length = head.lines().find_map(|line| line.strip_prefix("content-length:")?.trim().parse().ok());
         let whole = end + length.unwrap_or(0_usize);
         let body = String::from_utf8_lossy(self.0.get(end..whole)?).into_owned();
-        let reason = body.split_once("\"reason\":\"").and_then(|(_, rest)| rest.split('"').next());
-        let answer = Answer { status, reason: reason.map(str::to_owned) };
+        let said = |name: &str| {
+            let (_, rest) = body.split_once(&format!("\"{name}\":\""))?;
+            rest.split('"').next().map(str::to_owned)
+        };
+        let answer = Answer { status, reason: said("reason"), id: said("id") };
         self.0.drain(..whole);
         Some(answer)
     }
@@ -59,7 +64,7 @@ mod tests {
     fn answers_in_pieces_are_taken_one_by_one_when_they_are_whole() {
         let mut answers = Answers::default();
         answers.hear(b"HTTP/1.1 202 Accepted\r\ncontent-length: 2\r\n\r\n{}HTTP/1.1 429 Too");
-        assert_eq!(answers.next(), Some(Answer { status: 202, reason: None }));
+        assert_eq!(answers.next(), Some(Answer { status: 202, reason: None, id: None }));
         assert_eq!(answers.next(), None);
         answers.hear(b" Many\r\nContent-Length: 17\r\n\r\n{\"reason\":\"");
         assert_eq!(answers.next(), None);

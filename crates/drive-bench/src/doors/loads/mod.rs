@@ -1,6 +1,7 @@
 //! Loads that nobody means ill by: very many who read, command, or ask a gateway, all at once. Each says what it got.
 
 mod asking;
+mod client;
 mod commands;
 mod http;
 mod looking;
@@ -8,7 +9,6 @@ mod readers;
 
 use std::{
     collections::BTreeMap,
-    net::SocketAddr,
     ops::Range,
     sync::{
         Arc,
@@ -18,17 +18,10 @@ use std::{
     time::Duration,
 };
 
-use tokio::{
-    net::{TcpSocket, TcpStream},
-    task::JoinSet,
-    time::timeout,
-};
+use tokio::task::JoinSet;
 
 pub(super) use self::looking::Looking;
-use super::{
-    PATIENCE,
-    attacks::{Attack, attack, wait},
-};
+use super::attacks::{Attack, attack, wait};
 use crate::report::Unit;
 
 /// The first is none: beside it the others are judged.
@@ -108,16 +101,6 @@ where
     counted.into_iter().for_each(|tally| sum.add(tally));
     got.extend(sum.0.into_iter().map(|(what, count)| Got::new(what, Unit::Count, count as f64)));
     got
-}
-
-/// A connection from an address of one's own on this machine: each of them is somebody else to the daemon.
-async fn connect(number: u16, to: SocketAddr) -> std::io::Result<TcpStream> {
-    let [high, low] = number.to_be_bytes();
-    let socket = TcpSocket::new_v4()?;
-    socket.bind(SocketAddr::from(([127, 1, high, low.max(1)], 0)))?;
-    let stream = timeout(PATIENCE, socket.connect(to)).await??;
-    stream.set_nodelay(true)?;
-    Ok(stream)
 }
 
 const SECOND: Duration = Duration::from_secs(1);

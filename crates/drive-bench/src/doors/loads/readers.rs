@@ -1,6 +1,7 @@
 //! A thousand who read at once: those who poll and keep their connection, those who come anew each time, pages, and event streams.
 
 use std::{
+    io::{self, ErrorKind},
     net::SocketAddr,
     sync::{
         Arc,
@@ -15,8 +16,12 @@ use tokio::{
     time::{Instant, sleep, timeout},
 };
 
-use super::{Got, SECOND, Tally, all, connect, http::Answers};
-use crate::doors::{PATIENCE, attacks::Target};
+use super::{
+    Got, SECOND, Tally, all,
+    client::{Client, connect},
+    http::{Answer, Answers},
+};
+use crate::doors::attacks::Target;
 
 const READERS: u16 = 1_000;
 
@@ -30,52 +35,50 @@ pub(super) fn read(to: &Target, over: &AtomicBool) -> Vec<Got> {
 
 /// One in four each: a poll on a connection that is kept, a poll on a new one, a page, a stream.
 async fn reader(number: u16, http: SocketAddr, over: Arc<AtomicBool>) -> Tally {
-    let mut tally = Tally::default();
-    let mut kept = None;
+    let (mut tally, mut client) = (Tally::default(), Client::new(number, http));
     // Not all in the same moment.
     sleep(Duration::from_millis(u64::from(number))).await;
     while !over.load(Ordering::Relaxed) {
         let begun = Instant::now();
-        match number % 4 {
-            0 => poll(number, http, "/api/v1/drives", &mut kept, &mut tally).await,
-            1 => poll(number, http, "/api/v1/drives/pump%201", &mut None, &mut tally).await,
-            2 => poll(number, http, "/api/v1/state", &mut None, &mut tally).await,
-            _ => stream(number, http, &over, &mut tally).await,
+        let path = match number % 4 {
+            0 => "/api/v1/drives",
+            1 => "/api/v1/drives/pump%201",
+            2 => "/api/v1/state",
+            _ => {
+                stream(number, http, &over, &mut tally).await;
+                sleep(SECOND.saturating_sub(begun.elapsed())).await;
+                continue;
+            }
+        };
+        match client.ask("polls", &mut tally, async |open| poll(open, path).await).await {
+            Some(answer) if answer.status == 200 => tally.count(SERVED),
+            Some(answer) => {
+                tally.count(format!("polls refused: {}", answer.name()));
+                client.leave();
+            }
+            None => {}
+        }
+        if number % 4 != 0 {
+            client.leave();
         }
         sleep(SECOND.saturating_sub(begun.elapsed())).await;
     }
     tally
 }
 
-/// One poll, over a connection that is kept or a new one.
-async fn poll(number: u16, http: SocketAddr, path: &str, kept: &mut Option<TcpStream>, tally: &mut Tally) {
-    let mut open = match kept.take() {
-        Some(open) => open,
-        None => match connect(number, http).await {
-            Ok(open) => open,
-            Err(_) => return tally.count("polls that could not connect"),
-        },
-    };
+async fn poll(open: &mut TcpStream, path: &str) -> io::Result<Answer> {
     let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
-    let asked = async {
-        open.write_all(request.as_bytes()).await.ok()?;
-        let (mut answers, mut buffer) = (Answers::default(), vec![0; 16_384]);
-        loop {
-            let read = open.read(&mut buffer).await.ok().filter(|read| *read > 0)?;
-            answers.hear(buffer.get(..read)?);
-            if let Some(answer) = answers.next() {
-                return Some(answer);
-            }
+    open.write_all(request.as_bytes()).await?;
+    let (mut answers, mut buffer) = (Answers::default(), vec![0; 16_384]);
+    loop {
+        let read = open.read(&mut buffer).await?;
+        if read == 0 {
+            return Err(ErrorKind::UnexpectedEof.into());
         }
-    };
-    match timeout(PATIENCE, asked).await {
-        Err(_) => tally.count("polls without an answer within 5 s"),
-        Ok(None) => tally.count("polls whose connection was closed"),
-        Ok(Some(answer)) if answer.status == 200 => {
-            tally.count(SERVED);
-            *kept = Some(open);
+        answers.hear(buffer.get(..read).unwrap_or_default());
+        if let Some(answer) = answers.next() {
+            return Ok(answer);
         }
-        Ok(Some(answer)) => tally.count(format!("polls refused: {}", answer.name())),
     }
 }
 

@@ -3,12 +3,12 @@
 use std::{
     borrow::Cow,
     collections::HashMap,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
 
 use drive_fleet::{
-    Act, DriveHandle, Group, GroupFailure, GroupStart, GroupStop, GroupTicket, Link, Order, Outcome,
+    Act, DriveHandle, Fleet, Group, GroupFailure, GroupStart, GroupStop, GroupTicket, Link, Order, Outcome,
     StopTicket, Ticket, view::StopModesView,
 };
 use futures_util::future::join_all;
@@ -32,8 +32,37 @@ use drived_words::json::{milliseconds, unix};
 
 /// Outcomes of several drives that come within this time are told together.
 const TOGETHER: Duration = Duration::from_millis(50);
+/// And longer for many: what it takes to tell them anew must not take a processor.
+const EACH: Duration = Duration::from_micros(8);
 /// For how long an outcome that is not known may still be settled: as long as the command is remembered.
 const SETTLES_FOR: Duration = Duration::from_secs(600);
+
+/// The drives that a command is for, and by which id they are asked.
+pub(super) struct Meant {
+    id: String,
+    group: Group,
+}
+
+impl Meant {
+    pub(super) fn new(fleet: &Fleet, caller: &Caller, request: &Request, drives: Vec<DriveHandle>) -> Self {
+        let id = request.id.clone().unwrap_or_else(new_id);
+        let act = Act::of(&caller.name).through(&caller.origin).with_id(&id);
+        Self { id, group: fleet.group_of(drives).commanded_by(act) }
+    }
+
+    pub(super) fn drives(&self) -> &[DriveHandle] {
+        self.group.members()
+    }
+
+    /// Stops them, if that is what was asked.
+    pub(super) fn stop(&self, request: &Request) -> Option<Posted> {
+        let Action::Stop(order) = request.action else { return None };
+        Some(match (&request.target, self.drives()) {
+            (Target::Drive(_), [drive]) => Posted::Stop(drive.stop(order)),
+            _ => Posted::StopOfSeveral(self.group.stop(order)),
+        })
+    }
+}
 
 /// A command and the drives that are meant.
 #[derive(Clone)]
@@ -42,11 +71,11 @@ pub(super) struct Work(Arc<Inner>);
 struct Inner {
     plant: Plant,
     request: Request,
-    members: Vec<DriveHandle>,
+    group: Group,
     /// Where each stands among them, by his name.
     numbers: HashMap<Arc<str>, usize>,
-    /// What is told of each member, in their order.
-    parts: Mutex<Vec<CommandView>>,
+    /// What is told of each member, in their order. One that has changed is another one: so it is known which are to be told.
+    parts: Mutex<Vec<Arc<CommandView>>>,
     /// One of them has changed.
     changed: Notify,
     /// What holds for all of them.
@@ -54,7 +83,7 @@ struct Inner {
 }
 
 /// What was asked of the drives: it is on its way to them.
-enum Posted {
+pub(super) enum Posted {
     Stop(StopTicket),
     StopOfSeveral(GroupStop),
     SetpointOfSeveral(GroupTicket<Vec<(Arc<str>, Outcome)>>),
@@ -65,10 +94,8 @@ enum Posted {
 }
 
 impl Work {
-    pub(super) fn new(plant: Plant, caller: &Caller, request: &Request, members: Vec<DriveHandle>) -> Self {
-        let id = request.id.clone().unwrap_or_else(new_id);
-        let act = Act::of(&caller.name).through(&caller.origin).with_id(&id);
-        let members: Vec<_> = members.iter().map(|member| member.commanded_by(act.clone())).collect();
+    pub(super) fn new(plant: Plant, caller: &Caller, request: &Request, meant: Meant) -> Self {
+        let Meant { id, group } = meant;
         let head = CommandView {
             id,
             drive: None,
@@ -100,44 +127,53 @@ impl Work {
                 _ => part,
             }
         };
-        let parts = Mutex::new(members.iter().map(part).collect());
+        let parts = group.members().iter().map(|member| Arc::new(part(member))).collect();
+        let parts = Mutex::new(parts);
         let head = match &request.target {
             Target::Group(name) => CommandView { group: Some(name.clone()), ..head },
             Target::Selected(names) => CommandView { selected: names.clone(), ..head },
             Target::Drive(_) | Target::All => head,
         };
         let request = request.clone();
-        let numbers = members.iter().map(|member| Arc::clone(member.name())).zip(0..).collect();
-        Self(Arc::new(Inner { plant, request, members, numbers, parts, changed: Notify::new(), head }))
+        let numbers = group.members().iter().map(|member| Arc::clone(member.name())).zip(0..).collect();
+        Self(Arc::new(Inner { plant, request, group, numbers, parts, changed: Notify::new(), head }))
+    }
+
+    fn members(&self) -> &[DriveHandle] {
+        self.0.group.members()
+    }
+
+    fn parts(&self) -> MutexGuard<'_, Vec<Arc<CommandView>>> {
+        self.0.parts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The command as it is to be told now.
     pub(super) fn view(&self) -> CommandView {
-        let parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut parts = self.parts();
         if let (Target::Drive(_), Some(part)) = (&self.0.request.target, parts.first()) {
-            return part.clone();
+            return CommandView::clone(part);
         }
-        let outcome = of_all(parts.iter().map(|part| (part.outcome, part.reason.as_deref())));
-        let silent = |part: &CommandView| {
-            let number = part.drive.as_deref().and_then(|drive| self.0.numbers.get(drive));
-            let member = number.and_then(|number| self.0.members.get(*number));
+        let is_silent = |number: usize| {
+            let member = self.members().get(number);
             member.is_some_and(|member| member.snapshot().link != Link::Connected)
         };
         CommandView {
-            outcome,
+            outcome: of_all(parts.iter().map(|part| (part.outcome, part.reason.as_deref()))),
             open: parts.iter().any(|part| part.open),
             took_ms: parts.iter().filter_map(|part| part.took_ms).max(),
-            several: Some(SeveralView::of(parts, silent)),
+            several: Some(SeveralView::of(&mut parts, is_silent)),
             ..self.0.head.clone()
         }
     }
 
     /// Begins, and goes on whether or not anybody waits. What is asked of the drives is on its way to them when this
-    /// returns, whatever the caller's task has still to spend; only a start of several waits for its turn.
-    pub(super) fn begin(self, command: Command) {
-        let posted = self.post();
-        self.tell(&command);
-        tokio::spawn(self.carried(posted, command));
+    /// returns, whatever the caller's task has still to spend; only a start of several waits for its turn. A stop is under way.
+    pub(super) fn begin(self, command: Command, stops: Option<Posted>) {
+        let posted = stops.unwrap_or_else(|| self.post());
+        let first = Arc::clone(&command.borrow());
+        self.0.plant.0.tell_command(&first, None);
+        let runtime = self.0.plant.0.runtime.clone();
+        runtime.spawn(self.carried(posted, command));
     }
 
     async fn carried(self, posted: Posted, command: Command) {
@@ -158,7 +194,8 @@ impl Work {
 
     fn tell(&self, command: &Command) {
         let view = Arc::new(self.view());
-        self.0.plant.0.tell_command(&view);
+        let before = Arc::clone(&command.borrow());
+        self.0.plant.0.tell_command(&view, Some(&before));
         command.send_replace(view);
     }
 
@@ -166,24 +203,23 @@ impl Work {
     async fn tell_changes(&self, command: &Command) {
         loop {
             self.0.changed.notified().await;
-            sleep(TOGETHER).await;
+            let parts = u32::try_from(self.members().len()).unwrap_or(u32::MAX);
+            sleep(TOGETHER.max(EACH.saturating_mul(parts))).await;
             self.tell(command);
         }
     }
 
     fn post(&self) -> Posted {
-        let Inner { request, members, .. } = &*self.0;
-        match (request.action, &request.target, &**members) {
-            (Action::Stop(order), Target::Drive(_), [member]) => Posted::Stop(member.stop(order)),
-            (Action::Stop(order), ..) => Posted::StopOfSeveral(self.group().stop(order)),
-            (Action::Start { .. }, Target::Group(_) | Target::All, _) => Posted::Nothing,
-            (Action::Setpoint { setpoint, .. }, Target::Group(_) | Target::All, _) => {
-                Posted::SetpointOfSeveral(self.group().set_setpoint(setpoint))
+        let Inner { request, group, .. } = &*self.0;
+        match (request.action, &request.target) {
+            (Action::Start { .. }, Target::Group(_) | Target::All) => Posted::Nothing,
+            (Action::Setpoint { setpoint, .. }, Target::Group(_) | Target::All) => {
+                Posted::SetpointOfSeveral(group.set_setpoint(setpoint))
             }
-            (action, ..) => {
+            (action, _) => {
                 let expires = request.arrived + request.lifetime;
                 let order = |member: &DriveHandle| Some(member.order_until(order(action)?, expires));
-                Posted::Orders(members.iter().filter_map(order).collect())
+                Posted::Orders(group.members().iter().filter_map(order).collect())
             }
         }
     }
@@ -219,7 +255,7 @@ impl Work {
     async fn start_group(&self) {
         let Action::Start { direction, setpoint, until } = self.0.request.action else { return };
         let start = GroupStart { direction, setpoint, spacing: Duration::ZERO, until };
-        match self.group().start(start).await {
+        match self.0.group.start(start).await {
             Ok(started) => {
                 for (name, outcome) in started {
                     self.end_of(&name, &outcome);
@@ -242,14 +278,11 @@ impl Work {
         }
     }
 
-    fn group(&self) -> Group {
-        self.0.plant.fleet().group_of(self.0.members.iter().cloned())
-    }
-
     /// Waits until what is not known is.
     async fn settle(&self) {
-        let open = self.0.members.iter().enumerate().filter(|(number, _)| self.is_open_at(*number));
-        let each = open.map(|(number, member)| async move {
+        let open: Vec<bool> = self.parts().iter().map(|part| part.open).collect();
+        let open = self.members().iter().enumerate().zip(open).filter(|(_, is_open)| *is_open);
+        let each = open.map(|((number, member), _)| async move {
             let ended = Instant::now();
             if let Some(outcome) = settled(self.0.request.action, member, ended).await {
                 self.end_as(number, outcome, None, None);
@@ -258,14 +291,9 @@ impl Work {
         join_all(each).await;
     }
 
-    fn is_open(&self) -> bool {
-        (0..self.0.members.len()).any(|number| self.is_open_at(number))
-    }
-
     /// Whether it may still turn out what became of a part.
-    fn is_open_at(&self, number: usize) -> bool {
-        let parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
-        parts.get(number).is_some_and(|part| part.open)
+    fn is_open(&self) -> bool {
+        self.parts().iter().any(|part| part.open)
     }
 
     fn end_of(&self, name: &str, outcome: &Outcome) {
@@ -280,11 +308,8 @@ impl Work {
 
     /// Ends what has no outcome of its own.
     fn end_all(&self, word: OutcomeWord, reason: &'static str, text: &str) {
-        for number in 0..self.0.members.len() {
-            let outcome = {
-                let parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
-                parts.get(number).map(|part| part.outcome)
-            };
+        for number in 0..self.members().len() {
+            let outcome = self.parts().get(number).map(|part| part.outcome);
             if outcome == Some(OutcomeWord::Pending) {
                 self.end_as(number, word, Some(reason), Some(text.to_owned()));
             }
@@ -301,9 +326,9 @@ impl Work {
         outcome: Option<&Outcome>,
         (word, reason, text): (OutcomeWord, Option<&'static str>, Option<String>),
     ) {
-        let Some(member) = self.0.members.get(number) else { return };
-        let mut parts = self.0.parts.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(part) = parts.get_mut(number) {
+        let Some(member) = self.members().get(number) else { return };
+        let mut parts = self.parts();
+        if let Some(part) = parts.get_mut(number).map(Arc::make_mut) {
             let is_first = part.outcome == OutcomeWord::Pending;
             *part = part.clone().ended_as(word, reason, text, member, self.0.request.arrived);
             part.stop = outcome.and_then(Outcome::stop).map(StopModesView::from).or(part.stop.take());

@@ -31,7 +31,10 @@ pub use self::{
     outcome::OutcomeWord,
     said::Said,
 };
-use self::{carry::Work, log::Found};
+use self::{
+    carry::{Meant, Posted, Work},
+    log::Found,
+};
 use super::{Plant, views::CommandView};
 use drived_config::{config::Group, rights::Caller};
 
@@ -236,12 +239,62 @@ impl Plant {
             request.arrived = self.0.pulse.asked_after(request.arrived);
         }
         let asked_after = asked_after.min(request.arrived);
+        let meant = self.meant(caller, &request)?;
+        let meant = Meant::new(&fleet, caller, &request, meant);
+        // Held until it is on its way: a start that has passed is not behind a stop that passes after it.
+        let mut passing = self.0.stopped.pass();
+        // Before anything is made that is told of it: among thousands that takes longer than all their stops.
+        let stops = meant.stop(&request);
+        match request.action {
+            Action::Stop(_) => {
+                passing.note(caller, meant.drives());
+                self.0.watched.stop(meant.drives());
+                drop(passing);
+                let work = Work::new(self.clone(), caller, &request, meant);
+                self.begin_new(work, caller, request, stops)
+            }
+            action => {
+                passing.may_begin(caller, &request, asked_after, meant.drives())?;
+                if matches!(action, Action::Start { .. }) {
+                    meant.drives().iter().for_each(|drive| self.0.watched.start_anew(drive.name()));
+                }
+                let work = Work::new(self.clone(), caller, &request, meant);
+                self.begin_new(work, caller, request, None)
+            }
+        }
+    }
+
+    /// Begins what is new; of a stop of several, which is under way.
+    fn begin_new(
+        &self,
+        work: Work,
+        caller: &Caller,
+        request: Request,
+        stops: Option<Posted>,
+    ) -> Result<Told, Rejected> {
+        match self.0.commands.find_or_add(caller, request, work.view())? {
+            Found::Again(told) => Ok(told.subscribe()),
+            Found::New(command) => {
+                let told = command.subscribe();
+                work.begin(command, stops);
+                Ok(told)
+            }
+        }
+    }
+
+    /// The drives that are meant.
+    fn meant(&self, caller: &Caller, request: &Request) -> Result<Vec<DriveHandle>, Rejected> {
+        let fleet = &self.0.fleet;
+        let is_stop = matches!(request.action, Action::Stop(_));
+        // Whoever may stop, may stop them all: nobody is looked for by his name.
+        if is_stop && request.target == Target::All {
+            return Ok(fleet.drives());
+        }
         let may_be_less = is_stop && !matches!(request.target, Target::Drive(_));
         let mut members = Vec::new();
         // A reload gives no name to another drive meanwhile.
         let groups = self.0.groups.read().unwrap_or_else(PoisonError::into_inner);
         for name in self.named(&groups, &request.target)? {
-            // Whoever may stop, may stop them all.
             if !is_stop && !caller.may_command(&name, &groups) {
                 return Err(Rejected::OutOfScope { caller: caller.name.clone(), drive: name });
             }
@@ -252,25 +305,7 @@ impl Plant {
                 None => return Err(Rejected::NoDrive(name)),
             }
         }
-        drop(groups);
-        // Held until it is on its way: a start that has passed is not behind a stop that passes after it.
-        let _passed = self.0.stopped.pass(caller, &request, asked_after, &members)?;
-        for member in &members {
-            match request.action {
-                Action::Stop(_) => self.0.watched.stop(member.name()),
-                Action::Start { .. } => self.0.watched.start_anew(member.name()),
-                _ => {}
-            }
-        }
-        let work = Work::new(self.clone(), caller, &request, members);
-        match self.0.commands.find_or_add(caller, request, work.view())? {
-            Found::Again(told) => Ok(told.subscribe()),
-            Found::New(command) => {
-                let told = command.subscribe();
-                work.begin(command);
-                Ok(told)
-            }
-        }
+        Ok(members)
     }
 
     /// The names of the drives that are meant.
@@ -289,51 +324,63 @@ impl Plant {
 
 /// When a stop was last asked of each drive, by whichever face: what was asked before it is not begun after it.
 #[derive(Default)]
-pub(super) struct Stopped(Mutex<HashMap<String, LastStop>>);
+pub(super) struct Stopped(Mutex<HashMap<Arc<str>, LastStop>>);
 
 /// The last stop of a drive.
 struct LastStop {
     at: Instant,
-    origin: String,
+    origin: Arc<str>,
     /// The last from elsewhere.
     from_elsewhere: Option<Instant>,
 }
 
 /// Nothing else passes while this is there.
-type Passed<'a> = MutexGuard<'a, HashMap<String, LastStop>>;
+struct Passing<'a>(MutexGuard<'a, HashMap<Arc<str>, LastStop>>);
 
 impl Stopped {
-    fn pass(
+    fn pass(&self) -> Passing<'_> {
+        Passing(self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Passing<'_> {
+    /// These have been given their stops.
+    fn note(&mut self, caller: &Caller, drives: &[DriveHandle]) {
+        // What was asked for until now came before each of them.
+        let (at, origin) = (Instant::now(), Arc::<str>::from(&*caller.origin));
+        for drive in drives {
+            let last = self.0.get(drive.name());
+            let from_elsewhere = last.and_then(|last| last.before(&origin));
+            let stop = LastStop { at, origin: Arc::clone(&origin), from_elsewhere };
+            self.0.insert(Arc::clone(drive.name()), stop);
+        }
+    }
+
+    /// Whether no stop of these has overtaken what was asked.
+    fn may_begin(
         &self,
         caller: &Caller,
         request: &Request,
         asked_after: Instant,
-        members: &[DriveHandle],
-    ) -> Result<Passed<'_>, Rejected> {
-        let mut stopped = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_stop = matches!(request.action, Action::Stop(_));
-        for member in members {
-            let name = member.name().to_string();
-            let last = stopped.get(&name);
-            if is_stop {
-                let from_elsewhere = last.and_then(|last| last.before(&caller.origin));
-                let origin = caller.origin.clone();
-                stopped.insert(name, LastStop { at: Instant::now(), origin, from_elsewhere });
-            } else if last.is_some_and(|last| {
+        drives: &[DriveHandle],
+    ) -> Result<(), Rejected> {
+        let is_overtaken = |drive: &&DriveHandle| {
+            self.0.get(drive.name()).is_some_and(|last| {
                 let from_elsewhere = last.before(&caller.origin);
                 last.at > request.arrived || from_elsewhere.is_some_and(|at| at > asked_after)
-            }) {
-                return Err(Rejected::Stopped(name));
-            }
+            })
+        };
+        match drives.iter().find(is_overtaken) {
+            Some(drive) => Err(Rejected::Stopped(drive.name().to_string())),
+            None => Ok(()),
         }
-        Ok(stopped)
     }
 }
 
 impl LastStop {
     /// The last stop that did not come from there.
     fn before(&self, origin: &str) -> Option<Instant> {
-        if self.origin == origin { self.from_elsewhere } else { Some(self.at) }
+        if *self.origin == *origin { self.from_elsewhere } else { Some(self.at) }
     }
 }
 
@@ -391,6 +438,28 @@ mod tests {
         drop(held);
         assert!(started.await.unwrap().is_ok());
         assert!(plant.0.stopped.0.try_lock().is_ok(), "and then stops are taken");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn the_stops_of_all_are_on_their_way_before_anything_is_made_that_is_told_of_them() {
+        let plant = TestPlant::of(3).await.plant;
+        // Nothing can be told of a command meanwhile.
+        let held = plant.0.commands.hold();
+        let stopping = plant.clone();
+        let stopped = spawn_blocking(move || {
+            let caller = Caller::new("page", "page", Rights::ALL);
+            let (action, arrived) = (Action::Stop(StopMode::Ramp.into()), Instant::now());
+            let request = Request { id: None, target: Target::All, action, lifetime: LIFETIME, arrived };
+            stopping.begin(&caller, request)
+        });
+        let patience = std::time::Instant::now() + Duration::from_secs(20);
+        let has_its_own = |drive: &DriveHandle| drive.snapshot().stop.is_some();
+        while !plant.fleet().drives().iter().all(has_its_own) {
+            assert!(std::time::Instant::now() < patience, "a drive waits for what is told of its stop");
+            yield_now().await;
+        }
+        drop(held);
+        assert!(stopped.await.unwrap().is_ok());
     }
 
     #[tokio::test(start_paused = true)]

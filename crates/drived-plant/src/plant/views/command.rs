@@ -1,6 +1,6 @@
 //! One command and what became of it.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, sync::Arc};
 
 use drive_fleet::{Started, view::StopModesView};
 use schemars::JsonSchema;
@@ -85,9 +85,10 @@ impl CommandView {
 }
 
 /// What became of a command for several drives: every drive is counted once.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct SeveralView {
-    pub drives: Vec<CommandView>,
+    /// Each of them; of more than 256 the event stream tells those of which something is new, 256 at the most.
+    pub drives: Vec<Arc<CommandView>>,
     pub confirmed: usize,
     /// Those whose outcome is not known yet, and that answer.
     pub pending: usize,
@@ -100,24 +101,62 @@ pub struct SeveralView {
 }
 
 impl SeveralView {
-    pub fn of(mut drives: Vec<CommandView>, is_silent: impl Fn(&CommandView) -> bool) -> Self {
-        for drive in &mut drives {
-            drive.counted = Some(match drive.outcome {
+    /// Counts these, each as what it says then.
+    pub fn of(drives: &mut [Arc<CommandView>], is_silent: impl Fn(usize) -> bool) -> Self {
+        let mut several =
+            Self { drives: Vec::new(), confirmed: 0, pending: 0, not_reachable: 0, refused: 0, failed: 0 };
+        for (number, drive) in drives.iter_mut().enumerate() {
+            let counted = match drive.outcome {
                 OutcomeWord::Confirmed => Counted::Confirmed,
                 OutcomeWord::Refused => Counted::Refused,
-                _ if is_silent(drive) => Counted::NotReachable,
+                _ if is_silent(number) => Counted::NotReachable,
                 OutcomeWord::Pending => Counted::Pending,
                 _ => Counted::Failed,
-            });
+            };
+            *match counted {
+                Counted::Confirmed => &mut several.confirmed,
+                Counted::Pending => &mut several.pending,
+                Counted::NotReachable => &mut several.not_reachable,
+                Counted::Refused => &mut several.refused,
+                Counted::Failed => &mut several.failed,
+            } += 1;
+            if drive.counted != Some(counted) {
+                Arc::make_mut(drive).counted = Some(counted);
+            }
         }
-        let count = |kind| drives.iter().filter(|drive| drive.counted == Some(kind)).count();
-        Self {
-            confirmed: count(Counted::Confirmed),
-            pending: count(Counted::Pending),
-            not_reachable: count(Counted::NotReachable),
-            refused: count(Counted::Refused),
-            failed: count(Counted::Failed),
-            drives,
-        }
+        several.drives = drives.to_vec();
+        several
+    }
+
+    /// The same counts, with these of its drives.
+    pub const fn counts(&self, drives: Vec<Arc<CommandView>>) -> Self {
+        let Self { confirmed, pending, not_reachable, refused, failed, .. } = *self;
+        Self { drives, confirmed, pending, not_reachable, refused, failed }
+    }
+
+    /// Of how many drives.
+    pub const fn count(&self) -> usize {
+        self.confirmed + self.pending + self.not_reachable + self.refused + self.failed
+    }
+
+    /// Those of which something is new since it was told before.
+    pub fn news(&self, before: Option<&Self>) -> impl Iterator<Item = &Arc<CommandView>> {
+        let known = move |number: usize| before.and_then(|before| before.drives.get(number));
+        let is_new = move |(number, drive): &(usize, &Arc<CommandView>)| {
+            known(*number).is_none_or(|known| !Arc::ptr_eq(known, drive))
+        };
+        self.drives.iter().enumerate().filter(is_new).map(|(_, drive)| drive)
+    }
+}
+
+/// What is one and the same need not be looked at: of many drives most are, from one telling to the next.
+impl PartialEq for SeveralView {
+    fn eq(&self, other: &Self) -> bool {
+        let counts = |of: &Self| (of.confirmed, of.pending, of.not_reachable, of.refused, of.failed);
+        let is_same =
+            |(one, two): (&Arc<CommandView>, &Arc<CommandView>)| Arc::ptr_eq(one, two) || one == two;
+        counts(self) == counts(other)
+            && self.drives.len() == other.drives.len()
+            && self.drives.iter().zip(&other.drives).all(is_same)
     }
 }

@@ -142,7 +142,7 @@ impl Count {
         let several = match &command.several {
             Some(several) => several,
             None => {
-                one = SeveralView::of(vec![command.clone()], |_| is_silent);
+                one = SeveralView::of(&mut [Arc::new(command.clone())], |_| is_silent);
                 &one
             }
         };
@@ -154,7 +154,7 @@ impl Count {
             not_reachable: *not_reachable,
             refused: *refused,
             failed: *failed,
-            left: not_done.map(left).collect(),
+            left: not_done.map(|drive| left(drive)).collect(),
             is_open: drives.iter().any(|drive| drive.outcome == OutcomeWord::Pending),
         }
     }
