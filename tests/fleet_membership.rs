@@ -105,6 +105,36 @@ async fn a_running_drive_that_is_removed_ends_by_its_policy_and_the_others_go_on
     plant.event("the others' events", |kind| matches!(kind, EventKind::StopConfirmed { .. })).await;
 }
 
+/// A silent drive may take all the time there is, and its neighbour turns meanwhile.
+#[tokio::test(start_paused = true)]
+async fn who_ends_beside_a_silent_drive_is_asked_and_stopped_until_both_are_done() {
+    for is_shutdown in [false, true] {
+        let left = DriveSettings { on_exit: OnExit::Leave, ..DriveSettings::controlled("2") };
+        let members = vec![(FAMILY, 1, DriveSettings::controlled("1")), (FAMILY, 2, left)];
+        let plant = Plant::open(vec![Site::new(SerialSettings::MODBUS_DEFAULT, members)]).expect("it works");
+        started(&plant, "1").await;
+        started(&plant, "2").await;
+        let silent = plant.sites[0].simulated.slave(1).expect("it is there");
+        silent.mute();
+        let ended = match is_shutdown {
+            true => tokio::spawn(plant.fleet.shutdown(60 * SECOND)),
+            false => tokio::spawn(plant.fleet.remove(&["1", "2"], 60 * SECOND)),
+        };
+        sleep(20 * SECOND).await;
+        let neighbour = plant.drive("2");
+        assert!(runs(&plant, 2) && neighbour.snapshot().link == Link::Connected, "nobody has stopped it");
+        let outcome = neighbour.stop(StopMode::Ramp).await;
+        assert!(outcome.is_confirmed() && !runs(&plant, 2), "{outcome}");
+        assert_eq!(neighbour.start(Direction::Forward).await, Outcome::Refused(Refused::ShutDown));
+        silent.unmute();
+        let actions = ended.await.expect("it ends");
+        let [(_, ExitAction::Stopped(outcome)), (_, ExitAction::Left)] = &*actions else {
+            panic!("{actions:?}")
+        };
+        assert!(outcome.is_confirmed() && !runs(&plant, 1), "{outcome}");
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn other_settings_leave_the_motor_its_task_and_its_snapshot() {
     let plant = plant();

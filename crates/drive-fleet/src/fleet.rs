@@ -256,7 +256,9 @@ impl Fleet {
     }
 }
 
-/// Has the policies of these drives act: they are on their way when this returns. What is not done after `limit` is given up.
+/// Has the policies of these drives act: they are on their way when this returns. Whose policy is done is asked and stopped like any other
+/// until those of all are: one that is silent may take all of `limit`, and who waits for it may still turn. What is not done by then is
+/// given up.
 pub(crate) fn end(
     entries: Vec<Arc<Entry>>,
     why: Policy,
@@ -266,16 +268,17 @@ pub(crate) fn end(
     tell(&entries, || Urgent::Exit(why, round.part()));
     drop(round);
     async move {
-        let all_done = || join_all(entries.iter().map(|entry| exit_action(entry)));
-        let actions = match tokio::time::timeout(limit, all_done()).await {
-            Ok(actions) => actions,
-            Err(_) => {
-                // Each still says how far it has come.
-                tell(&entries, || Urgent::ExitTimeOver);
-                all_done().await
-            }
+        let all_leave = async {
+            join_all(entries.iter().map(|entry| has_acted(entry))).await;
+            tell(&entries, || Urgent::Leave);
+            join_all(entries.iter().map(|entry| has_left(entry))).await;
         };
-        entries.iter().map(|entry| Arc::clone(&entry.name)).zip(actions).collect()
+        if tokio::time::timeout(limit, all_leave).await.is_err() {
+            // Each still says how far it has come.
+            tell(&entries, || Urgent::ExitTimeOver);
+            join_all(entries.iter().map(|entry| has_left(entry))).await;
+        }
+        entries.iter().map(|entry| (Arc::clone(&entry.name), entry.exit_action())).collect()
     }
 }
 
@@ -286,12 +289,15 @@ fn tell(entries: &[Arc<Entry>], message: impl Fn() -> Urgent) {
     }
 }
 
-async fn exit_action(entry: &Entry) -> ExitAction {
+/// Until its policy is done. Of a task that is gone there is no more to come.
+async fn has_acted(entry: &Entry) {
+    let _ = entry.exit.clone().wait_for(Option::is_some).await;
+}
+
+/// Until its task is gone.
+async fn has_left(entry: &Entry) {
     let mut exit = entry.exit.clone();
-    match exit.wait_for(Option::is_some).await {
-        Ok(ended) => ended.as_ref().map_or(ExitAction::TimeOver, |(action, _)| action.clone()),
-        Err(_) => ExitAction::TimeOver,
-    }
+    while exit.changed().await.is_ok() {}
 }
 
 /// A reader of the fleet's events: by [`recv`](Self::recv), or as a [`Stream`] that ends with the fleet.

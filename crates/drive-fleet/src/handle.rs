@@ -60,6 +60,11 @@ impl Entry {
         Arc::clone(&self.settings.read().unwrap_or_else(PoisonError::into_inner))
     }
 
+    /// What was done to it at its end, once it is.
+    pub(crate) fn exit_action(&self) -> ExitAction {
+        self.exit.borrow().as_ref().map_or(ExitAction::TimeOver, |(action, _)| action.clone())
+    }
+
     fn new_call(&self) -> CallId {
         CallId(self.calls.fetch_add(1, Ordering::Relaxed))
     }

@@ -66,6 +66,8 @@ pub(crate) enum Urgent {
     Renamed(Arc<DriveSettings>, watch::Sender<Arc<Snapshot>>),
     /// The fleet shuts down, or the drive leaves it: by which policy it ends.
     Exit(Policy, Round),
+    /// All that end together have ended: the drive goes on no longer than a stop of it is under way.
+    Leave,
     /// The time for shutting down is over.
     ExitTimeOver,
 }

@@ -315,6 +315,7 @@ impl Desk {
                 self.round = Some(round);
                 self.supervisor.handle_exit(now, why)
             }
+            Urgent::Leave => self.supervisor.handle_leave(),
             Urgent::ExitTimeOver => {
                 self.supervisor.handle_exit_time_over();
                 true

@@ -37,8 +37,21 @@ pub(super) enum Exit {
         /// What was done to the motor before.
         action: ExitAction,
     },
-    /// Done.
+    /// Done. Until all that end together are done, the drive is asked and stopped like any other.
     Done(ExitAction),
+}
+
+/// Whether the conversation with the drive ends behind its exit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Leaving {
+    /// Others are waited for.
+    No,
+    /// Unless a stop is under way.
+    OnceStopped,
+    /// Whatever is under way.
+    Now,
+    /// It has ended.
+    Gone,
 }
 
 impl Supervisor {
@@ -79,8 +92,43 @@ impl Supervisor {
         self.stop_by_policy(now, Asker::Policy(self.exits_by), mode);
     }
 
+    /// All that end together are done. Gives whether the job in flight has to be dropped for it.
+    pub(crate) fn handle_leave(&mut self) -> bool {
+        // It may have been stopped since.
+        if self.exit == Exit::Done(ExitAction::LeftTurning) && !self.turns() {
+            self.exit = Exit::Done(ExitAction::Left);
+        }
+        self.leaving = Leaving::OnceStopped;
+        matches!(self.in_flight, Some(Job::Status { .. } | Job::KeepAlive))
+    }
+
+    /// What was done at the exit, once it is.
+    pub(crate) const fn exit_action(&self) -> Option<&ExitAction> {
+        match &self.exit {
+            Exit::Done(action) => Some(action),
+            _ => None,
+        }
+    }
+
+    /// Whether the conversation is over, which is told once.
+    pub(super) fn is_gone(&mut self) -> bool {
+        let Exit::Done(action) = &self.exit else { return false };
+        match self.leaving {
+            Leaving::No => return false,
+            Leaving::OnceStopped if self.stopping.is_some() => return false,
+            Leaving::Gone => return true,
+            Leaving::OnceStopped | Leaving::Now => self.leaving = Leaving::Gone,
+        }
+        if self.exits_by == Policy::Removal {
+            let kind = EventKind::Removed(action.clone());
+            self.emit_by(kind, Cause::policy(Policy::Removal));
+        }
+        true
+    }
+
     /// The time for shutting down is over.
     pub(crate) fn handle_exit_time_over(&mut self) {
+        self.leaving = Leaving::Now;
         match std::mem::replace(&mut self.exit, Exit::No) {
             Exit::Done(action) => self.exit = Exit::Done(action),
             Exit::Restoring { action, .. } => {
@@ -195,11 +243,10 @@ impl Supervisor {
     }
 
     fn exit_done(&mut self, action: ExitAction) {
-        let kind = match self.exits_by {
-            Policy::Removal => EventKind::Removed(action.clone()),
-            _ => EventKind::Exit(action.clone()),
-        };
-        self.emit_by(kind, Cause::policy(self.exits_by));
+        // Who is taken out is not gone before the others are done.
+        if self.exits_by != Policy::Removal {
+            self.emit_by(EventKind::Exit(action.clone()), Cause::policy(self.exits_by));
+        }
         self.exit = Exit::Done(action);
     }
 }

@@ -36,7 +36,7 @@ use tokio::time::Instant;
 use self::{
     adoption::Adoption,
     checks::Checks,
-    exit::Exit,
+    exit::{Exit, Leaving},
     orders::{Active, Queued},
     pace::Pace,
     questions::Questions,
@@ -53,7 +53,7 @@ use crate::{
     cause::{Act, Cause, ChangedWord, Policy},
     concern::{self, ConcernKind},
     eeprom::{EepromUse, Ledger},
-    event::{EventKind, ExitAction, Happened},
+    event::{EventKind, Happened},
     exceeded::Limit,
     limits::Given,
     outcome::{Outcome, Refused, Unknown},
@@ -153,6 +153,7 @@ pub(crate) struct Supervisor {
     exit: Exit,
     /// Why it ends.
     exits_by: Policy,
+    leaving: Leaving,
     /// Who asked for the last start that was sent.
     started_by: Option<CallId>,
     /// The run command of this side that stands in the drive, or may, as the family keeps it.
@@ -224,6 +225,7 @@ impl Supervisor {
             withdrawal: None,
             exit: Exit::No,
             exits_by: Policy::Exit,
+            leaving: Leaving::No,
             started_by: None,
             lease: None,
             ledger: Ledger::new(now, settings.eeprom_before.clone()),
@@ -282,7 +284,7 @@ impl Supervisor {
     pub(crate) fn next(&mut self, now: Instant) -> Step {
         // What the time has ended ends before anything is chosen: nothing that has expired is sent.
         self.handle_time(now);
-        if let Exit::Done(_) = self.exit {
+        if self.is_gone() {
             return Step::Finished;
         }
         self.turn_ends = None;
@@ -375,7 +377,7 @@ impl Supervisor {
 
     fn background_job(&self, now: Instant) -> Option<Job> {
         // What is known of the drive is read anew first, or it would be asked by what another one has said.
-        if self.unseen {
+        if self.unseen || self.exit_action().is_some() {
             return None;
         }
         if self.explanations > 0 {
@@ -403,7 +405,7 @@ impl Supervisor {
         if self.link == Link::Connected {
             at = at.min(self.lost_at());
             at = self.checks.feed_at().into_iter().fold(at, Instant::min);
-            if self.turn == Turn::Unwanted && !self.unseen {
+            if self.turn == Turn::Unwanted && !self.unseen && self.exit_action().is_none() {
                 at = at.min(self.pace.slow_due());
                 at = self.checks.wake_at().into_iter().fold(at, Instant::min);
             }
@@ -595,14 +597,6 @@ impl Supervisor {
             counters: self.counters,
             max_age: self.settings.periods.max_age,
             measurements_max_age: self.settings.periods.slow.saturating_add(self.settings.periods.max_age),
-        }
-    }
-
-    /// What was done at the exit, once it is.
-    pub(crate) fn exit_action(&self) -> Option<&ExitAction> {
-        match &self.exit {
-            Exit::Done(action) => Some(action),
-            _ => None,
         }
     }
 

@@ -88,8 +88,7 @@ pub(super) fn status(said: &Said, around: &[Look]) -> Result<(), String> {
     let is_as_before = |look: &Look| {
         look.life == first.life
             && look.seen.running == first.seen.running
-            && (!first.seen.running
-                || look.seen.shaft_frequency.abs_diff(first.seen.shaft_frequency) <= 20)
+            && (!first.seen.running || look.seen.shaft_frequency.abs_diff(first.seen.shaft_frequency) <= 20)
     };
     let is_steady = around.iter().all(is_as_before);
     let mut against = around.iter().map(|look| contradiction(&said.status, &look.seen));

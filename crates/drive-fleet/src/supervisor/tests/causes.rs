@@ -136,6 +136,8 @@ fn a_stop_says_who_stopped_and_a_removal_is_no_exit() {
         rig.outputs.clear();
         rig.machine.handle_exit(rig.now, policy);
         rig.pass(2_000 * MS);
+        rig.machine.handle_leave();
+        rig.pass(100 * MS);
         for event in ["state changed", "stop confirmed", "command", name] {
             assert_eq!(rig.cause_of(event), by_policy(policy), "{event}: {:?}", rig.outputs);
         }

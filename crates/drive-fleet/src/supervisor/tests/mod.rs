@@ -18,6 +18,7 @@ use drive_core::{
 
 use super::*;
 use crate::{
+    event::ExitAction,
     limits::{Band, FrequencyLimits},
     outcome::{Order, Refused, Unconfirmed, Until},
     settings::{Commanders, OnControlTaken, OnExit, OnFault, OnLoss},
