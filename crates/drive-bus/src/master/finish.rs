@@ -7,7 +7,7 @@ use tokio::time::Instant;
 use tokio_modbus::Request;
 
 use super::{
-    Asked, Flight, Master, Purpose,
+    Asked, Flight, Master, Purpose, Sent,
     port::PortState,
     probing::Question,
     row::{self, Come},
@@ -106,7 +106,12 @@ impl<C> Master<C> {
                 }
                 Err(failure) => {
                     if entry.terms.class == Class::Stop {
-                        self.offline.stop_failed(now, slave, took.max(self.in_vain()));
+                        // What it waited behind was owed for others, each of which has had its own share.
+                        let usual = |sent: Sent| sent.usually_by.saturating_duration_since(flight.started);
+                        let behind = flight.sent.filter(|_| flight.behind > 0);
+                        let own = behind.map_or(took, |sent| took.min(usual(sent)));
+                        let own = crate::mutant!("stop-rests-for-others", own, took);
+                        self.offline.stop_failed(now, slave, own.max(self.in_vain()));
                     }
                     let waited = flight.sent.map_or(Duration::ZERO, |sent| {
                         sent.timeout.min(now.saturating_duration_since(sent.end))
