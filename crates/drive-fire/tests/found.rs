@@ -195,9 +195,9 @@ fn no_order_of_a_gateway_that_was_a_find_is_one_again() {
         ("Unknown", "ffgbbihgjgijadgj", "the only probe went to a drive that nobody asked for"),
         ("Silent", &*"f".repeat(30), "thirty stops in vain end after two minutes: the model was wrong"),
         (
-            "Silent",
-            "ffffffffffffjjjjjjjjjjjjjjf",
-            "the thirteenth of thirteen stops in vain sent after minutes",
+            "Unknown",
+            "ffffffffffffjjjjjjjjjjf",
+            "the thirteenth of thirteen stops in vain waited for the shares of all",
         ),
         ("Unknown", "hcdhjgde", "a timeout of a second, learned behind what a lost connection had asked"),
     ] {
