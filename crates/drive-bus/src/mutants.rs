@@ -75,6 +75,7 @@ pub const ALL: &[Mutant] = &[
     mutant("stop-dropped-with-its-caller", "a stop is sent whether its caller waits or not"),
     mutant("stop-dropped-offline", "a stop is sent to a slave that is off-line"),
     mutant("stop-waits-for-the-gateway", "a stop is sent whatever the far end owes"),
+    mutant("stop-rests-for-others", "a stop waits for its own share of the line"),
     mutant("far-end-owes-nothing", "no more is owed than the bound of a stop allows"),
     mutant("far-end-owes-for-ever", "what is owed is over at its time"),
     mutant("far-end-serves-side-by-side", "a gateway is not asked while it is at a question in vain"),

@@ -4,7 +4,7 @@ use std::{collections::VecDeque, mem, time::Duration};
 
 use tokio::time::Instant;
 
-use crate::exchange::{Answer, Failure};
+use crate::exchange::{Brought, Failure};
 
 /// The most bytes that are kept of a request or of what was heard: the longest Modbus ASCII frame. More is a babbler's.
 const LONGEST: usize = 513;
@@ -56,7 +56,7 @@ pub enum Ending {
 }
 
 impl Ending {
-    pub(crate) const fn of(result: &Result<Answer, Failure>) -> Self {
+    pub(crate) const fn of(result: &Brought) -> Self {
         match result {
             Ok(Ok(_)) => Self::Answered,
             Ok(Err(_)) => Self::Exception,

@@ -18,7 +18,7 @@ use drive_core::{
     Class, PortError,
     serial::{CharacterFormat, SerialSettings},
 };
-use support::{MS, script::Script};
+use support::{MS, calls, script::Script};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::time::Instant;
 use tokio_modbus::{ExceptionCode, Request, Response, client::Client};
@@ -241,17 +241,16 @@ async fn a_line_speaks_ascii_and_leaves_a_late_slave_alone() {
     let ascii = Protocol::Ascii(AsciiSettings::default());
     let config = LineConfig { protocol: ascii, retries: 0, ..LineConfig::stream(settings()) };
     let line = Line::over(ours, config);
-    let (mut slave, mut again) = (line.slave(2), line.slave(2));
     let mut frames = vec![0; 64];
 
-    let call = tokio::spawn(async move { slave.call(WRITE).await });
+    let call = calls(line.slave(2), WRITE);
     let len = theirs.read(&mut frames).await.unwrap();
     assert_eq!(&frames[..len], PRINTED);
     let lost = PortError::from_modbus(call.await.unwrap().unwrap_err());
     assert_eq!(lost, PortError::OutcomeUnknown("no answer"));
 
     // The same again: its confirmation could be the first one's.
-    let call = tokio::spawn(async move { again.call(WRITE).await });
+    let call = calls(line.slave(2), WRITE);
     let early = tokio::time::timeout(100 * MS, theirs.read(&mut frames)).await;
     assert!(early.is_err(), "it is asked in its late window");
     theirs.write_all(PRINTED).await.unwrap();

@@ -48,13 +48,6 @@ fn asked(request: &[u8]) -> u8 {
     request[5]
 }
 
-/// Nothing is sent for so long.
-fn nothing_is_sent_for(line: &mut ByHand, time: Duration) {
-    let until = line.now + time;
-    assert_eq!(line.next_sent(until), None);
-    line.now = until;
-}
-
 #[test]
 fn an_answer_that_comes_twice_is_not_the_answer_to_the_next_request() {
     for after in [3, 5, 8] {
@@ -132,42 +125,31 @@ fn after_a_timeout_the_next_read_asks_another_length_so_that_the_late_answer_is_
 #[test]
 fn a_slave_has_its_pause_behind_an_answer_that_came_late() {
     let pause = SlaveSettings { turnaround: 40 * MS, ..SlaveSettings::default() };
-    let mut line = ByHand::new(LineConfig { retries: 0, ..config() }.slave(1, pause));
-    line.ask(1, 1, READ, Terms::default().sparing(3));
-    let request = line.sent();
-    nothing_is_sent_for(&mut line, 600 * MS);
-    assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
+    let terms = Terms::default().sparing(3);
+    let mut line = ByHand::after_a_question_in_vain(once().slave(1, pause), READ, terms, 600 * MS);
     line.hears(RESPONSE, &rtu::frame(1, &words(&[1, 1])));
     let late = line.now;
     line.ask(2, 1, STOP, Terms::of(Class::Stop));
     line.sent();
-    assert!(line.now >= late + 40 * MS, "{request:02X?}: {:?}", line.now - late);
+    assert!(line.now >= late + 40 * MS, "{:?}", line.now - late);
 }
 
 #[test]
 fn what_is_owed_is_asked_for_by_nobody_for_a_minute() {
-    let mut line = ByHand::new(once());
-    line.ask(1, 1, READ, Terms::default().sparing(3));
-    line.sent();
-    nothing_is_sent_for(&mut line, 2_000 * MS);
-    assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
+    let mut line = ByHand::after_a_question_in_vain(once(), READ, Terms::default().sparing(3), 2_000 * MS);
     for _ in 0..40 {
         line.ask(2, 1, READ, Terms::default().sparing(3));
         let request = line.sent();
         assert_ne!(asked(&request), 2);
         line.answers(&request, &words(&vec![7; asked(&request).into()]));
         assert_eq!(line.ended(), Some((2, read(&[7, 7]))));
-        nothing_is_sent_for(&mut line, 1_000 * MS);
+        line.sends_nothing_for(1_000 * MS);
     }
 }
 
 #[test]
 fn what_is_owed_is_not_forgotten_behind_many_writes_of_other_values() {
-    let mut line = ByHand::new(once());
-    line.ask(1, 1, READ, Terms::default().sparing(3));
-    line.sent();
-    nothing_is_sent_for(&mut line, 2_000 * MS);
-    assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
+    let mut line = ByHand::after_a_question_in_vain(once(), READ, Terms::default().sparing(3), 2_000 * MS);
     for value in 0..40 {
         line.ask(2, 1, Request::WriteSingleRegister(8502, value), Terms::default());
         let write = line.sent();
@@ -178,7 +160,7 @@ fn what_is_owed_is_not_forgotten_behind_many_writes_of_other_values() {
         assert_ne!(asked(&request), 2, "behind {value} writes");
         line.answers(&request, &words(&vec![7; asked(&request).into()]));
         assert_eq!(line.ended(), Some((3, read(&[7, 7]))));
-        nothing_is_sent_for(&mut line, 300 * MS);
+        line.sends_nothing_for(300 * MS);
     }
 }
 
@@ -197,7 +179,7 @@ fn after_a_stray_answer_equal_reads_alternate_their_length_for_a_minute() {
     let mut line = ByHand::new(config());
     let lengths = |line: &mut ByHand| -> Vec<u8> {
         let ask = |line: &mut ByHand| {
-            nothing_is_sent_for(line, 500 * MS);
+            line.sends_nothing_for(500 * MS);
             line.ask(1, 1, READ, Terms::default().sparing(1));
             let request = line.sent();
             line.answers(&request, &words(&vec![1; asked(&request).into()]));
@@ -210,7 +192,7 @@ fn after_a_stray_answer_equal_reads_alternate_their_length_for_a_minute() {
     line.hears(100 * MS, &rtu::frame(1, &words(&[9, 9])));
     let alternating = lengths(&mut line);
     assert!(alternating.windows(2).all(|pair| pair[0] != pair[1]), "{alternating:?}");
-    nothing_is_sent_for(&mut line, Duration::from_secs(61));
+    line.sends_nothing_for(Duration::from_secs(61));
     assert_eq!(lengths(&mut line), [2, 2, 2, 2]);
 }
 
@@ -293,7 +275,7 @@ fn a_late_confirmation_proves_a_write_that_is_repeated_and_none_that_followed_an
     for between in [false, true] {
         line.ask(1, 1, STOP, Terms::of(Class::Stop));
         let stop = line.sent();
-        nothing_is_sent_for(&mut line, 600 * MS);
+        line.sends_nothing_for(600 * MS);
         assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
         if between {
             line.ask(2, 1, start.clone(), Terms::of(Class::Command));
@@ -306,7 +288,7 @@ fn a_late_confirmation_proves_a_write_that_is_repeated_and_none_that_followed_an
         line.answers(&stop, &stop[1..6]);
         let Some((3, outcome)) = line.ended() else { panic!("it has ended") };
         assert_eq!(outcome.is_ok(), !between);
-        nothing_is_sent_for(&mut line, 2_000 * MS);
+        line.sends_nothing_for(2_000 * MS);
     }
 }
 
@@ -324,12 +306,9 @@ fn a_confirmation_that_names_no_value_proves_none_while_that_of_another_value_is
         // Behind the late window the slave has answered something else: what it was asked before is over.
         (0, Class::Command, 2_000, true, true),
     ] {
-        let mut line = ByHand::new(once());
-        line.ask(1, 1, write(64), Terms::of(Class::Command));
-        line.sent();
-        nothing_is_sent_for(&mut line, 600 * MS);
-        assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
-        nothing_is_sent_for(&mut line, wait * MS);
+        let command = Terms::of(Class::Command);
+        let mut line = ByHand::after_a_question_in_vain(once(), write(64), command, 600 * MS);
+        line.sends_nothing_for(wait * MS);
         if is_read {
             line.ask(2, 1, READ, Terms::default());
             let request = line.sent();
@@ -381,7 +360,7 @@ fn a_damaged_echo_of_an_adapter_that_was_taken_for_silent_is_no_damaged_answer()
         let mut echo = request.clone();
         echo[4] ^= 0x10;
         line.hears(SERIAL.characters(request.len()), &echo);
-        nothing_is_sent_for(&mut line, 40 * MS);
+        line.sends_nothing_for(40 * MS);
         line.hears(RESPONSE, &rtu::frame(1, &words(&[1, 1])));
         assert_eq!(line.ended(), Some((1, read(&[1, 1]))));
         let request = line.sent();
@@ -402,7 +381,7 @@ fn the_echo_of_a_write_is_no_confirmation_though_the_adapter_was_taken_for_silen
             line.hears(SERIAL.characters(8) + RESPONSE, &request);
             assert!(matches!(line.ended(), Some((1, Ok(_)))));
         } else {
-            nothing_is_sent_for(&mut line, 1_000 * MS);
+            line.sends_nothing_for(1_000 * MS);
             assert_eq!(line.ended(), Some((1, Err(PortError::OutcomeUnknown("no answer")))));
         }
     }
@@ -426,11 +405,7 @@ fn over_tcp_an_answer_that_comes_damaged_and_then_good_is_not_that_to_the_retry(
 
 #[test]
 fn a_refusal_that_may_be_that_of_an_earlier_request_is_not_taken() {
-    let mut line = ByHand::new(once());
-    line.ask(1, 1, READ, Terms::default());
-    line.sent();
-    nothing_is_sent_for(&mut line, 600 * MS);
-    assert!(line.ended().is_some());
+    let mut line = ByHand::after_a_question_in_vain(once(), READ, Terms::default(), 600 * MS);
     // Another length, so that it need not wait; the late answer is a refusal.
     line.ask(2, 1, Request::ReadHoldingRegisters(3201, 5), Terms::default());
     let request = line.sent();
@@ -485,7 +460,7 @@ fn the_time_of_the_next_probe_is_never_said_to_be_nothing() {
     for _ in 0..=config().retries {
         line.sent();
     }
-    nothing_is_sent_for(&mut line, 600 * MS);
+    line.sends_nothing_for(600 * MS);
     for _ in 0..40 {
         let Err(error @ PortError::Offline { .. }) = line.submit(2, 1, READ, Terms::default()) else {
             panic!("it is off-line")

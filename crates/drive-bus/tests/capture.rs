@@ -14,9 +14,9 @@ use drive_bus::{
     master::Master,
 };
 use drive_core::{PortError, Terms, serial::SerialSettings};
-use support::{MS, line};
+use support::{MS, calls, line};
 use tokio::time::Instant;
-use tokio_modbus::{Request, Response, client::Client};
+use tokio_modbus::{Request, Response};
 
 #[derive(Clone, Default)]
 struct Sink(Arc<Mutex<Vec<u8>>>);
@@ -37,10 +37,7 @@ async fn record() -> Vec<u8> {
     let (line, mut peer) = line(|config| config);
     let sink = Sink::default();
     let writing = line.capture(sink.clone()).unwrap();
-    let call = |address| {
-        let mut slave = line.slave(3);
-        tokio::spawn(async move { slave.call(Request::ReadHoldingRegisters(address, 1)).await })
-    };
+    let call = |address| calls(line.slave(3), Request::ReadHoldingRegisters(address, 1));
     let first = call(10);
     peer.request().await;
     peer.one_by_one(&rtu::frame(3, &[3, 2, 0, 10])).await;
@@ -121,8 +118,7 @@ async fn what_a_capture_has_heard_last_is_kept_for_whoever_asks_later_and_withou
     let (line, mut peer) = line(|config| config);
     let begin = Instant::now();
     let ask = async |peer: &mut support::Peer| {
-        let mut slave = line.slave(3);
-        let call = tokio::spawn(async move { slave.call(Request::ReadHoldingRegisters(10, 1)).await });
+        let call = calls(line.slave(3), Request::ReadHoldingRegisters(10, 1));
         peer.answer(&[3, 2, 0, 10]).await;
         call.await.unwrap().unwrap().unwrap();
     };

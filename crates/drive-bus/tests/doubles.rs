@@ -9,7 +9,7 @@ use std::time::Duration;
 use drive_bus::{Line, LineConfig, exchange::rtu};
 use drive_core::{Class, SerialSettings, Terms};
 use drive_sim::{Gateway, SimLine, Wiring, models::atv312::Atv312};
-use support::{MS, by_hand::ByHand, read, rig::Random};
+use support::{MS, by_hand::ByHand, doubling, read, rig::Random};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
     time::sleep,
@@ -115,21 +115,14 @@ async fn a_stray_that_cannot_be_our_own_double_is_avoided_where_another_shape_co
 
 #[test]
 fn after_one_late_answer_what_cannot_differ_waits_for_nothing() {
-    const READ: Request<'static> = Request::ReadHoldingRegisters(3201, 1);
-    let mut line =
-        ByHand::new(LineConfig { retries: 0, double_window: 50 * MS, ..LineConfig::stream(SERIAL) });
-    line.ask(0, 1, READ, Terms::default());
-    let request = line.sent();
-    let until = line.now + 600 * MS;
-    assert_eq!(line.next_sent(until), None);
-    line.now = until;
-    assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
-    line.hears(MS, &drive_bus::exchange::rtu::frame(request[0], &[3, 2, 0, 1]));
+    let config = LineConfig { retries: 0, double_window: 50 * MS, ..LineConfig::stream(SERIAL) };
+    let mut line = ByHand::after_a_question_in_vain(config, ONE_WORD, Terms::default(), 600 * MS);
+    line.hears(MS, &rtu::frame(1, &[3, 2, 0, 1]));
     line.now += 1_000 * MS;
     // The measurements of an Altivar 21 are sixteen reads of one word each.
     let begun = line.now;
     for call in 1..=16 {
-        line.ask(call, 1, READ, Terms::of(Class::Background));
+        line.ask(call, 1, ONE_WORD, Terms::of(Class::Background));
         let request = line.sent();
         line.answers(&request, &[3, 2, 0, call as u8]);
         assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_ok()));
@@ -141,23 +134,16 @@ fn after_one_late_answer_what_cannot_differ_waits_for_nothing() {
 const ONE_WORD: Request<'static> = Request::ReadHoldingRegisters(3201, 1);
 
 /// A line whose far end may answer at once, with a question in vain whose late window is over.
-fn after_a_question_in_vain() -> (ByHand, u8) {
+fn after_a_question_in_vain() -> ByHand {
     let config = LineConfig { retries: 0, far_end_paces: Some(false), ..LineConfig::stream(SERIAL) };
-    let mut line = ByHand::new(config);
-    line.ask(0, 1, ONE_WORD, Terms::default());
-    let request = line.sent();
-    let until = line.now + 2_000 * MS;
-    assert_eq!(line.next_sent(until), None);
-    line.now = until;
-    assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
-    (line, request[0])
+    ByHand::after_a_question_in_vain(config, ONE_WORD, Terms::default(), 2_000 * MS)
 }
 
 #[test]
 fn an_answer_that_was_kept_until_the_next_question_is_not_that_to_it() {
-    let (mut line, slave) = after_a_question_in_vain();
+    let mut line = after_a_question_in_vain();
     for (caller, (late, right)) in [(2, 25_600), (2, 25_601)].into_iter().enumerate() {
-        let word = |word: u16| rtu::frame(slave, &[&[3, 2][..], &word.to_be_bytes()].concat());
+        let word = |word: u16| rtu::frame(1, &[&[3, 2][..], &word.to_be_bytes()].concat());
         line.ask(caller as u32 + 1, 1, ONE_WORD, Terms::default());
         line.sent();
         line.hears(9 * MS, &word(late));
@@ -172,17 +158,15 @@ fn an_answer_that_was_kept_until_the_next_question_is_not_that_to_it() {
         line.now += 60 * MS;
         line.ask(9, 1, ONE_WORD, Terms::default());
         line.sent();
-        let until = line.now + 2_000 * MS;
-        assert_eq!(line.next_sent(until), None);
-        line.now = until;
+        line.sends_nothing_for(2_000 * MS);
         assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
     }
 }
 
 #[test]
 fn where_the_kept_answer_never_comes_a_question_is_asked_twice_once() {
-    let (mut line, slave) = after_a_question_in_vain();
-    let right = rtu::frame(slave, &[3, 2, 0, 7]);
+    let mut line = after_a_question_in_vain();
+    let right = rtu::frame(1, &[3, 2, 0, 7]);
     for (caller, questions) in [(1, 2), (2, 1), (3, 1)] {
         line.ask(caller, 1, ONE_WORD, Terms::default());
         for question in 1..=questions {
@@ -196,48 +180,26 @@ fn where_the_kept_answer_never_comes_a_question_is_asked_twice_once() {
 
 #[test]
 fn what_comes_once_more_though_it_was_owed_withdraws_what_was_taken_instead() {
-    let (mut line, slave) = after_a_question_in_vain();
+    let mut line = after_a_question_in_vain();
     line.ask(1, 1, ONE_WORD, Terms::default());
     line.sent();
-    line.hears(15 * MS, &rtu::frame(slave, &[3, 2, 0, 7]));
+    line.hears(15 * MS, &rtu::frame(1, &[3, 2, 0, 7]));
     line.sent();
-    line.hears(15 * MS, &rtu::frame(slave, &[3, 2, 0, 7]));
+    line.hears(15 * MS, &rtu::frame(1, &[3, 2, 0, 7]));
     assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_ok()));
     assert_eq!(line.master.stats(line.now).slaves[&1].retracted, 0);
-    line.hears(100 * MS, &rtu::frame(slave, &[3, 2, 0, 8]));
+    line.hears(100 * MS, &rtu::frame(1, &[3, 2, 0, 8]));
     assert_eq!(line.master.stats(line.now).slaves[&1].retracted, 1);
 }
 
 /// Reads of five registers of one word in a row, of a far end that says one answer in ten once more after 4, 10 or 30 ms. Gives how
 /// many were told wrong behind the first row, in which nothing is known of them.
 async fn wrong_beside_doubles(seed: u64) -> u32 {
-    let (ours, far) = tokio::io::duplex(4_096);
-    let line = Line::over(ours, LineConfig { far_end_paces: Some(false), ..LineConfig::stream(SERIAL) });
-    let (mut from, mut to) = tokio::io::split(far);
-    let (say, mut said) = tokio::sync::mpsc::unbounded_channel::<Vec<u8>>();
-    tokio::spawn(async move {
-        while let Some(frame) = said.recv().await {
-            let _ = to.write_all(&frame).await;
-        }
+    let mut random = Random::new(seed);
+    let (_line, mut slave) = doubling::line(move |register| {
+        let again = (random.below(10) == 0).then(|| [4, 10, 30][random.below(3) as usize]);
+        (register, again.map(Duration::from_millis))
     });
-    tokio::spawn(async move {
-        let mut random = Random::new(seed);
-        let mut bytes = [0; 256];
-        while let Ok(8) = from.read(&mut bytes).await {
-            let frame = rtu::frame(1, &[3, 2, bytes[2], bytes[3]]).to_vec();
-            let again = (random.below(10) == 0).then(|| [4, 10, 30][random.below(3) as usize]);
-            let say = say.clone();
-            tokio::spawn(async move {
-                sleep(12 * MS).await;
-                let _ = say.send(frame.clone());
-                if let Some(again) = again {
-                    sleep(again * MS).await;
-                    let _ = say.send(frame);
-                }
-            });
-        }
-    });
-    let mut slave = line.slave(1).with_terms(Terms::of(Class::Status));
     let mut wrong = 0;
     for row in 0..200 {
         for register in 1..=5 {

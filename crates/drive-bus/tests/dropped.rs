@@ -4,7 +4,7 @@ mod support;
 
 use drive_bus::exchange::rtu;
 use drive_core::{Class, Terms};
-use support::{MS, line, read, write};
+use support::{MS, line, read, reads, write, writes};
 use tokio::{
     task::yield_now,
     time::{Instant, timeout_at},
@@ -14,8 +14,8 @@ use tokio::{
 /// come within a second after that.
 async fn dropped(class: Class, is_write: bool) -> Vec<Vec<u8>> {
     let (line, mut peer) = line(|config| config);
-    let (mut slave, mut other) = (line.slave(3), line.slave(4).with_terms(Terms::of(class)));
-    let first = tokio::spawn(async move { read(&mut slave, 10, 1).await });
+    let mut other = line.slave(4).with_terms(Terms::of(class));
+    let first = reads(line.slave(3), 10, 1);
     peer.request().await;
     let call = tokio::spawn(async move {
         let _ =
@@ -55,8 +55,7 @@ async fn whatever_else_was_dropped_before_it_was_sent_never_is() {
 #[tokio::test(start_paused = true)]
 async fn a_stop_that_is_dropped_while_it_is_on_the_wire_is_asked_again() {
     let (line, mut peer) = line(|config| config);
-    let mut slave = line.slave(4).with_terms(Terms::of(Class::Stop));
-    let call = tokio::spawn(async move { write(&mut slave, 20, 1).await });
+    let call = writes(line.slave(4).with_terms(Terms::of(Class::Stop)), 20, 1);
     let stop = peer.request().await;
     call.abort();
     assert!(call.await.unwrap_err().is_cancelled());

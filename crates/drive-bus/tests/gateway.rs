@@ -5,7 +5,7 @@
 
 mod support;
 
-use std::{future::ready, time::Duration};
+use std::{future::ready, ops::Range, time::Duration};
 
 use drive_bus::{
     Line, LineConfig, Protocol,
@@ -184,30 +184,36 @@ async fn a_stop_behind_a_gateway_waits_for_one_question_in_vain() {
     }
 }
 
+/// The waits of stops that are given at so many times after three drives have died.
+async fn waits(habits: Gateway, times: Range<u32>, line: impl Fn(&Plant) -> Line) -> Vec<Duration> {
+    let mut waits = Vec::new();
+    for after in times.map(|n| 211 * MS * n) {
+        let plant = plant(habits);
+        let line = line(&plant);
+        let died = Instant::now() + 2 * SECOND;
+        let stops = async {
+            sleep_until(died).await;
+            (1..=3).for_each(|address| plant.drive(address).mute());
+            sleep(after).await;
+            let (called, bound) = (Instant::now(), line.worst_case_stop());
+            let learned = line.stats().worst_case_stop;
+            let mut slave = line.slave(6).with_terms(Terms::of(Class::Stop));
+            assert!(write(&mut slave, CMD, 0).await.is_ok(), "{after:?} with {habits:?}");
+            let waited = plant.stopped(6).expect("it is confirmed") - called;
+            assert!(waited <= bound.min(learned), "{waited:?} of {bound:?}, {learned:?}, {after:?}");
+            waited
+        };
+        let polling = polled(&line, &[1, 2, 3], died, died + after + 8 * SECOND);
+        let (waited, _) = tokio::join!(stops, polling);
+        waits.push(waited);
+    }
+    waits
+}
+
 #[tokio::test(start_paused = true)]
 async fn several_that_die_at_once_behind_a_gateway_delay_a_stop_by_no_more_than_the_line_says() {
     for habits in kinds() {
-        let mut worst = Duration::ZERO;
-        for after in (0..60).map(|n| 211 * MS * n) {
-            let plant = plant(habits);
-            let line = plant.line();
-            let died = Instant::now() + 2 * SECOND;
-            let stops = async {
-                sleep_until(died).await;
-                (1..=3).for_each(|address| plant.drive(address).mute());
-                sleep(after).await;
-                let (called, bound) = (Instant::now(), line.worst_case_stop());
-                let learned = line.stats().worst_case_stop;
-                let mut slave = line.slave(6).with_terms(Terms::of(Class::Stop));
-                assert!(write(&mut slave, CMD, 0).await.is_ok(), "{after:?} with {habits:?}");
-                let waited = plant.stopped(6).expect("it is confirmed") - called;
-                assert!(waited <= bound.min(learned), "{waited:?} of {bound:?}, {learned:?}, {after:?}");
-                waited
-            };
-            let polling = polled(&line, &[1, 2, 3], died, died + after + 8 * SECOND);
-            let (waited, _) = tokio::join!(stops, polling);
-            worst = worst.max(waited);
-        }
+        let worst = waits(habits, 0..60, Plant::line).await.into_iter().max();
         println!("{habits:?}: a stop waited for {worst:?}");
     }
 }
@@ -257,30 +263,9 @@ async fn a_stop_of_all_is_repeated_to_who_comes_back_however_many_were_in_vain_b
     }
 }
 
-/// The waits of stops that are given at so many times after three drives have died, by a line that may take two connections.
+/// The same by a line that may take two connections.
 async fn waits_with_two(habits: Gateway) -> Vec<Duration> {
-    let mut waits = Vec::new();
-    for after in (1..40).map(|n| 211 * MS * n) {
-        let plant = plant(habits);
-        let line = plant.line_of_two(drive_bus::Gateway::default());
-        let died = Instant::now() + 2 * SECOND;
-        let stops = async {
-            sleep_until(died).await;
-            (1..=3).for_each(|address| plant.drive(address).mute());
-            sleep(after).await;
-            let (called, bound) = (Instant::now(), line.worst_case_stop());
-            let learned = line.stats().worst_case_stop;
-            let mut slave = line.slave(6).with_terms(Terms::of(Class::Stop));
-            assert!(write(&mut slave, CMD, 0).await.is_ok(), "{after:?} with {habits:?}");
-            let waited = plant.stopped(6).expect("it is confirmed") - called;
-            assert!(waited <= bound.min(learned), "{waited:?} of {bound:?}, {learned:?}, {after:?}");
-            waited
-        };
-        let polling = polled(&line, &[1, 2, 3], died, died + after + 8 * SECOND);
-        let (waited, _) = tokio::join!(stops, polling);
-        waits.push(waited);
-    }
-    waits
+    waits(habits, 1..40, |plant| plant.line_of_two(drive_bus::Gateway::default())).await
 }
 
 #[tokio::test(start_paused = true)]

@@ -4,7 +4,7 @@ mod support;
 
 use drive_bus::{Echo, LineConfig, exchange::rtu};
 use drive_core::PortError;
-use support::{MS, characters, line, read, write};
+use support::{MS, calls, characters, line, read, reads, write, writes};
 use tokio::time::Instant;
 use tokio_modbus::{ExceptionCode, Request, client::Client, client::Context, prelude::*};
 
@@ -24,8 +24,7 @@ async fn an_answer_reaches_its_caller_through_a_tokio_modbus_context() {
 #[tokio::test(start_paused = true)]
 async fn an_exception_is_the_inner_error_and_is_not_repeated() {
     let (line, mut peer) = line(|config| config);
-    let mut slave = line.slave(3);
-    let call = tokio::spawn(async move { slave.call(Request::ReadHoldingRegisters(9, 1)).await });
+    let call = calls(line.slave(3), Request::ReadHoldingRegisters(9, 1));
     peer.answer(&[0x83, 2]).await;
     assert_eq!(call.await.unwrap().unwrap(), Err(ExceptionCode::IllegalDataAddress));
     assert_eq!(line.stats().slaves[&3].outcomes.exceptions, 1);
@@ -53,13 +52,12 @@ async fn who_has_been_refused_often_enough_is_refused_further_without_a_question
 #[tokio::test(start_paused = true)]
 async fn a_late_answer_is_never_taken_for_the_next() {
     let (line, mut peer) = line(without_retries);
-    let (mut slave, mut same) = (line.slave(3), line.slave(3));
-    let first = tokio::spawn(async move { read(&mut slave, 10, 1).await });
+    let first = reads(line.slave(3), 10, 1);
     peer.request().await;
     assert_eq!(first.await.unwrap(), Err(PortError::Timeout { after: 500 * MS }));
 
     // The same slave, the same shape: it is left alone until the late answer has come or cannot come any more.
-    let second = tokio::spawn(async move { read(&mut same, 20, 1).await });
+    let second = reads(line.slave(3), 20, 1);
     peer.hears_nothing_for(100 * MS).await;
     peer.now(&rtu::frame(3, &[3, 2, 0xAA, 0xAA])).await;
     assert_eq!(peer.answer(&[3, 2, 0, 20]).await, rtu::frame(3, &[3, 0, 20, 0, 1]));
@@ -70,12 +68,11 @@ async fn a_late_answer_is_never_taken_for_the_next() {
 #[tokio::test(start_paused = true)]
 async fn while_one_slave_is_in_quarantine_the_others_are_served_and_its_late_answer_does_no_harm() {
     let (line, mut peer) = line(without_retries);
-    let (mut slow, mut slow_again, mut other) = (line.slave(3), line.slave(3), line.slave(4));
-    let first = tokio::spawn(async move { read(&mut slow, 10, 1).await });
+    let first = reads(line.slave(3), 10, 1);
     peer.request().await;
     assert!(first.await.unwrap().is_err());
-    let second = tokio::spawn(async move { read(&mut slow_again, 20, 1).await });
-    let third = tokio::spawn(async move { read(&mut other, 30, 1).await });
+    let second = reads(line.slave(3), 20, 1);
+    let third = reads(line.slave(4), 30, 1);
     assert_eq!(peer.request().await[0], 4);
     // The late answer comes in the middle of the other slave's exchange.
     peer.after(3 * MS, &rtu::frame(3, &[3, 2, 0xAA, 0xAA])).await;
@@ -97,11 +94,11 @@ async fn a_crc_error_in_a_long_frame_recovers_at_once() {
     let mut damaged = rtu::frame(3, &pdu).to_vec();
     damaged[50] ^= 0x10;
     peer.after(5 * MS, &damaged).await;
-    let (result, mut slave) = call.await.unwrap();
+    let (result, slave) = call.await.unwrap();
     assert_eq!(result, Err(PortError::Damaged("CRC")));
     assert!(start.elapsed() < 150 * MS, "given up long before the timeout, after {:?}", start.elapsed());
 
-    let next = tokio::spawn(async move { read(&mut slave, 0, 1).await });
+    let next = reads(slave, 0, 1);
     peer.answer(&[3, 2, 0, 9]).await;
     assert_eq!(next.await.unwrap(), Ok(vec![9]));
 }
@@ -109,8 +106,7 @@ async fn a_crc_error_in_a_long_frame_recovers_at_once() {
 #[tokio::test(start_paused = true)]
 async fn a_damaged_read_is_repeated() {
     let (line, mut peer) = line(|config| config);
-    let mut slave = line.slave(3);
-    let call = tokio::spawn(async move { read(&mut slave, 0, 1).await });
+    let call = reads(line.slave(3), 0, 1);
     peer.request().await;
     peer.after(5 * MS, &[3, 3, 2, 0, 9, 0xFF, 0xFF]).await;
     peer.answer(&[3, 2, 0, 9]).await;
@@ -121,8 +117,7 @@ async fn a_damaged_read_is_repeated() {
 #[tokio::test(start_paused = true)]
 async fn a_foreign_answer_is_ignored_and_the_timer_runs_on() {
     let (line, mut peer) = line(without_retries);
-    let mut slave = line.slave(3);
-    let call = tokio::spawn(async move { read(&mut slave, 0, 1).await });
+    let call = reads(line.slave(3), 0, 1);
     peer.request().await;
     peer.after(5 * MS, &rtu::frame(9, &[3, 2, 0, 1])).await;
     peer.after(60 * MS, &rtu::frame(3, &[3, 2, 0, 2])).await;
@@ -133,8 +128,7 @@ async fn a_foreign_answer_is_ignored_and_the_timer_runs_on() {
 #[tokio::test(start_paused = true)]
 async fn noise_before_an_answer_is_no_part_of_it() {
     let (line, mut peer) = line(without_retries);
-    let mut slave = line.slave(3);
-    let call = tokio::spawn(async move { read(&mut slave, 0, 1).await });
+    let call = reads(line.slave(3), 0, 1);
     peer.request().await;
     let mut bytes = vec![0xFF, 0x00, 0x03];
     bytes.extend(rtu::frame(3, &[3, 2, 0, 2]));
@@ -147,8 +141,7 @@ async fn noise_before_an_answer_is_no_part_of_it() {
 async fn a_wrong_confirmation_is_refused() {
     let (line, mut peer) = line(without_retries);
     for wrong in [&[6, 0x21, 0x35, 0, 4][..], &[6, 0x21, 0x36, 0, 3]] {
-        let mut slave = line.slave(3);
-        let call = tokio::spawn(async move { write(&mut slave, 0x2135, 3).await });
+        let call = writes(line.slave(3), 0x2135, 3);
         peer.answer(wrong).await;
         let error = call.await.unwrap().unwrap_err();
         assert_eq!(error, PortError::OutcomeUnknown("the confirmation does not fit"));
@@ -158,8 +151,7 @@ async fn a_wrong_confirmation_is_refused() {
 #[tokio::test(start_paused = true)]
 async fn a_short_answer_to_a_read_is_refused() {
     let (line, mut peer) = line(without_retries);
-    let mut slave = line.slave(3);
-    let call = tokio::spawn(async move { read(&mut slave, 0, 2).await });
+    let call = reads(line.slave(3), 0, 2);
     peer.answer(&[3, 2, 0, 1]).await;
     assert!(matches!(call.await.unwrap(), Err(PortError::Mismatch(_))));
 }
@@ -167,12 +159,10 @@ async fn a_short_answer_to_a_read_is_refused() {
 #[tokio::test(start_paused = true)]
 async fn a_call_dropped_while_it_is_on_the_wire_does_no_harm() {
     let (line, mut peer) = line(|config| config);
-    let mut slave = line.slave(3);
-    let call = tokio::spawn(async move { read(&mut slave, 10, 1).await });
+    let call = reads(line.slave(3), 10, 1);
     peer.request().await;
     call.abort();
-    let mut slave = line.slave(3);
-    let next = tokio::spawn(async move { read(&mut slave, 20, 1).await });
+    let next = reads(line.slave(3), 20, 1);
     peer.after(5 * MS, &rtu::frame(3, &[3, 2, 0, 10])).await;
     peer.answer(&[3, 2, 0, 20]).await;
     assert_eq!(next.await.unwrap(), Ok(vec![20]));
@@ -181,10 +171,9 @@ async fn a_call_dropped_while_it_is_on_the_wire_does_no_harm() {
 #[tokio::test(start_paused = true)]
 async fn a_call_dropped_before_it_is_sent_never_is() {
     let (line, mut peer) = line(|config| config);
-    let (mut slave, mut other) = (line.slave(3), line.slave(4));
-    let first = tokio::spawn(async move { read(&mut slave, 10, 1).await });
+    let first = reads(line.slave(3), 10, 1);
     peer.request().await;
-    let dropped = tokio::spawn(async move { write(&mut other, 20, 1).await });
+    let dropped = writes(line.slave(4), 20, 1);
     tokio::task::yield_now().await;
     dropped.abort();
     peer.after(5 * MS, &rtu::frame(3, &[3, 2, 0, 10])).await;
@@ -219,8 +208,7 @@ async fn the_echo_of_a_write_to_a_dead_slave_is_never_its_confirmation() {
     for echo in [Echo::Auto, Echo::On] {
         // The very first request of the line is a write, and nobody but the adapter answers.
         let (line, mut peer) = line(|config| LineConfig { echo, retries: 0, ..config });
-        let mut slave = line.slave(3);
-        let call = tokio::spawn(async move { write(&mut slave, 20, 7).await });
+        let call = writes(line.slave(3), 20, 7);
         let echoing = tokio::spawn(async move {
             loop {
                 let request = peer.request().await;
@@ -235,8 +223,7 @@ async fn the_echo_of_a_write_to_a_dead_slave_is_never_its_confirmation() {
 #[tokio::test(start_paused = true)]
 async fn where_nothing_echoes_a_first_write_is_confirmed_after_one_read() {
     let (line, mut peer) = line(|config| LineConfig { echo: Echo::Auto, ..config });
-    let mut slave = line.slave(3);
-    let call = tokio::spawn(async move { write(&mut slave, 20, 7).await });
+    let call = writes(line.slave(3), 20, 7);
     assert_eq!(peer.answer(&[0x83, 2]).await[1], 3);
     assert_eq!(peer.answer(&[6, 0, 20, 0, 7]).await[1], 6);
     assert_eq!(call.await.unwrap(), Ok(()));
@@ -254,8 +241,7 @@ async fn a_broadcast_returns_after_its_turnaround_and_nothing_is_sent_before() {
         start.elapsed()
     });
     assert_eq!(peer.request().await, rtu::frame(0, &[6, 0x21, 0x35, 0, 0]));
-    let mut slave = line.slave(1);
-    let next = tokio::spawn(async move { read(&mut slave, 0, 1).await });
+    let next = reads(line.slave(1), 0, 1);
     peer.hears_nothing_for(100 * MS).await;
     peer.answer(&[3, 2, 0, 1]).await;
     assert_eq!(next.await.unwrap(), Ok(vec![1]));
@@ -289,8 +275,7 @@ async fn every_function_is_answered_whole_byte_by_byte_twice_and_after_damage() 
     let (line, mut peer) = line(|config| config);
     for (request, answer) in exchanges {
         for way in ["whole", "byte by byte", "twice", "after damage"] {
-            let (mut slave, sent) = (line.slave(2), request.clone());
-            let call = tokio::spawn(async move { slave.call(sent).await });
+            let call = calls(line.slave(2), request.clone());
             let got = peer.request().await;
             let frame = rtu::frame(2, &answer);
             match way {

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use drive_bus::{LineConfig, SlaveSettings, exchange::rtu};
 use drive_core::{Class, PortError, Terms, serial::SerialSettings};
-use support::{MS, line, read, write};
+use support::{MS, line, read, reads, write, writes};
 use tokio::time::Instant;
 
 fn without_retries(config: LineConfig) -> LineConfig {
@@ -18,8 +18,7 @@ async fn the_silence_before_a_request_is_never_shorter_than_3_5_characters() {
     let t3_5 = SerialSettings::MODBUS_DEFAULT.t3_5();
     let (line, mut peer) = line(|config| config);
     for n in 0..20 {
-        let mut slave = line.slave(1 + n % 3);
-        let call = tokio::spawn(async move { read(&mut slave, 0, 1).await });
+        let call = reads(line.slave(1 + n % 3), 0, 1);
         let silent_from = Instant::now();
         peer.answer(&[3, 2, 0, 1]).await;
         assert_eq!(call.await.unwrap(), Ok(vec![1]));
@@ -34,13 +33,12 @@ async fn the_silence_before_a_request_is_never_shorter_than_3_5_characters() {
 async fn a_slaves_own_pause_is_spent_serving_another() {
     let pause = SlaveSettings { turnaround: 50 * MS, ..SlaveSettings::default() };
     let (line, mut peer) = line(|config| config.slave(1, pause));
-    let (mut one, mut one_again, mut two) = (line.slave(1), line.slave(1), line.slave(2));
-    let first = tokio::spawn(async move { read(&mut one, 0, 1).await });
+    let first = reads(line.slave(1), 0, 1);
     peer.answer(&[3, 2, 0, 1]).await;
     assert!(first.await.unwrap().is_ok());
     let answered = Instant::now();
-    let second = tokio::spawn(async move { read(&mut one_again, 0, 1).await });
-    let third = tokio::spawn(async move { read(&mut two, 0, 1).await });
+    let second = reads(line.slave(1), 0, 1);
+    let third = reads(line.slave(2), 0, 1);
     assert_eq!(peer.answer(&[3, 2, 0, 2]).await[0], 2);
     assert_eq!(peer.answer(&[3, 2, 0, 3]).await[0], 1);
     assert!(answered.elapsed() >= 50 * MS);
@@ -50,24 +48,12 @@ async fn a_slaves_own_pause_is_spent_serving_another() {
 #[tokio::test(start_paused = true)]
 async fn a_stop_goes_before_everything_and_takes_waiting_commands_with_it() {
     let (line, mut peer) = line(|config| config);
-    let busy = tokio::spawn({
-        let mut slave = line.slave(9);
-        async move { read(&mut slave, 0, 1).await }
-    });
+    let busy = reads(line.slave(9), 0, 1);
     peer.request().await;
-    let poll = tokio::spawn({
-        let mut slave = line.slave(2);
-        async move { read(&mut slave, 0, 1).await }
-    });
-    let start = tokio::spawn({
-        let mut slave = line.slave(1).with_terms(Terms::of(Class::Command));
-        async move { write(&mut slave, 8501, 15).await }
-    });
+    let poll = reads(line.slave(2), 0, 1);
+    let start = writes(line.slave(1).with_terms(Terms::of(Class::Command)), 8501, 15);
     tokio::time::sleep(MS).await;
-    let stop = tokio::spawn({
-        let mut slave = line.slave(1).with_terms(Terms::of(Class::Stop));
-        async move { write(&mut slave, 8501, 0).await }
-    });
+    let stop = writes(line.slave(1).with_terms(Terms::of(Class::Stop)), 8501, 0);
     peer.after(5 * MS, &rtu::frame(9, &[3, 2, 0, 1])).await;
     assert!(busy.await.unwrap().is_ok());
     assert_eq!(peer.answer(&[6, 0x21, 0x35, 0, 0]).await[..2], [1, 6]);
@@ -80,10 +66,7 @@ async fn a_stop_goes_before_everything_and_takes_waiting_commands_with_it() {
 #[tokio::test(start_paused = true)]
 async fn a_command_expires_in_the_queue_and_is_never_sent_late() {
     let (line, mut peer) = line(without_retries);
-    let busy = tokio::spawn({
-        let mut slave = line.slave(9);
-        async move { read(&mut slave, 0, 1).await }
-    });
+    let busy = reads(line.slave(9), 0, 1);
     peer.request().await;
     let terms = Terms::of(Class::Command).within(200 * MS);
     let start = Instant::now();
@@ -97,18 +80,12 @@ async fn a_command_expires_in_the_queue_and_is_never_sent_late() {
 #[tokio::test(start_paused = true)]
 async fn the_latest_setpoint_wins_while_none_is_sent() {
     let (line, mut peer) = line(|config| config);
-    let busy = tokio::spawn({
-        let mut slave = line.slave(9);
-        async move { read(&mut slave, 0, 1).await }
-    });
+    let busy = reads(line.slave(9), 0, 1);
     peer.request().await;
     let terms = Terms::of(Class::Command).replacing(8502);
     let setpoints: Vec<_> = [100, 200, 300]
         .into_iter()
-        .map(|value| {
-            let mut slave = line.slave(1).with_terms(terms);
-            tokio::spawn(async move { write(&mut slave, 8502, value).await })
-        })
+        .map(|value| writes(line.slave(1).with_terms(terms), 8502, value))
         .collect();
     tokio::time::sleep(MS).await;
     peer.after(5 * MS, &rtu::frame(9, &[3, 2, 0, 1])).await;
@@ -124,14 +101,12 @@ async fn the_latest_setpoint_wins_while_none_is_sent() {
 #[tokio::test(start_paused = true)]
 async fn a_level_is_written_again_an_edge_never() {
     let (line, mut peer) = line(|config| config);
-    let mut slave = line.slave(1);
-    let level = tokio::spawn(async move { write(&mut slave, 8502, 1).await });
+    let level = writes(line.slave(1), 8502, 1);
     peer.request().await;
     peer.answer(&[6, 0x21, 0x36, 0, 1]).await;
     assert_eq!(level.await.unwrap(), Ok(()));
 
-    let mut slave = line.slave(1).with_terms(Terms::of(Class::Command).edge());
-    let edge = tokio::spawn(async move { write(&mut slave, 8501, 128).await });
+    let edge = writes(line.slave(1).with_terms(Terms::of(Class::Command).edge()), 8501, 128);
     peer.request().await;
     assert_eq!(edge.await.unwrap(), Err(PortError::OutcomeUnknown("no answer")));
     peer.hears_nothing_for(2_000 * MS).await;
@@ -140,8 +115,7 @@ async fn a_level_is_written_again_an_edge_never() {
 #[tokio::test(start_paused = true)]
 async fn a_dead_slave_goes_off_line_fails_fast_and_comes_back_by_a_probe() {
     let (line, mut peer) = line(|config| config);
-    let mut slave = line.slave(1);
-    let call = tokio::spawn(async move { read(&mut slave, 7, 1).await });
+    let call = reads(line.slave(1), 7, 1);
     for _ in 0..3 {
         peer.request().await;
     }
@@ -154,8 +128,7 @@ async fn a_dead_slave_goes_off_line_fails_fast_and_comes_back_by_a_probe() {
     assert_eq!(peer.answer(&[3, 2, 0, 1]).await, rtu::frame(1, &[3, 0, 7, 0, 1]));
     tokio::time::sleep(MS).await;
     assert!(!line.stats().slaves[&1].offline);
-    let mut slave = line.slave(1);
-    let call = tokio::spawn(async move { read(&mut slave, 7, 1).await });
+    let call = reads(line.slave(1), 7, 1);
     peer.answer(&[3, 2, 0, 5]).await;
     assert_eq!(call.await.unwrap(), Ok(vec![5]));
 }
@@ -163,8 +136,7 @@ async fn a_dead_slave_goes_off_line_fails_fast_and_comes_back_by_a_probe() {
 #[tokio::test(start_paused = true)]
 async fn a_stop_is_sent_to_an_off_line_slave_and_a_probe_gives_way_to_it() {
     let (line, mut peer) = line(|config| config);
-    let mut slave = line.slave(1);
-    let call = tokio::spawn(async move { read(&mut slave, 7, 1).await });
+    let call = reads(line.slave(1), 7, 1);
     for _ in 0..3 {
         peer.request().await;
     }
@@ -172,8 +144,7 @@ async fn a_stop_is_sent_to_an_off_line_slave_and_a_probe_gives_way_to_it() {
     assert_eq!(peer.request().await[1], 3, "the probe");
     tokio::time::sleep(10 * MS).await;
     let start = Instant::now();
-    let mut slave = line.slave(2).with_terms(Terms::of(Class::Stop));
-    let stop = tokio::spawn(async move { write(&mut slave, 8501, 0).await });
+    let stop = writes(line.slave(2).with_terms(Terms::of(Class::Stop)), 8501, 0);
     peer.answer(&[6, 0x21, 0x35, 0, 0]).await;
     assert_eq!(stop.await.unwrap(), Ok(()));
     assert!(start.elapsed() < 50 * MS, "{:?}", start.elapsed());
@@ -182,12 +153,7 @@ async fn a_stop_is_sent_to_an_off_line_slave_and_a_probe_gives_way_to_it() {
 #[tokio::test(start_paused = true)]
 async fn a_full_queue_says_so() {
     let (line, _peer) = line(|config| LineConfig { queue_limit: 2, ..config });
-    let waiting: Vec<_> = (1..=4)
-        .map(|address| {
-            let mut slave = line.slave(address);
-            tokio::spawn(async move { read(&mut slave, 0, 1).await })
-        })
-        .collect();
+    let waiting: Vec<_> = (1..=4).map(|address| reads(line.slave(address), 0, 1)).collect();
     tokio::task::yield_now().await;
     tokio::task::yield_now().await;
     let refused = read(&mut line.slave(5), 0, 1).await;
@@ -198,10 +164,9 @@ async fn a_full_queue_says_so() {
 #[tokio::test(start_paused = true)]
 async fn closing_ends_what_waits_and_lets_the_exchange_finish() {
     let (line, mut peer) = line(|config| config);
-    let (mut one, mut two) = (line.slave(1), line.slave(2));
-    let under_way = tokio::spawn(async move { read(&mut one, 0, 1).await });
+    let under_way = reads(line.slave(1), 0, 1);
     peer.request().await;
-    let waiting = tokio::spawn(async move { read(&mut two, 0, 1).await });
+    let waiting = reads(line.slave(2), 0, 1);
     tokio::task::yield_now().await;
     let closing = tokio::spawn({
         let line = line.clone();
@@ -217,8 +182,7 @@ async fn closing_ends_what_waits_and_lets_the_exchange_finish() {
 #[tokio::test(start_paused = true)]
 async fn a_write_whose_repetition_is_refused_after_a_lost_answer_has_an_unknown_outcome() {
     let (line, mut peer) = line(|config| config);
-    let mut slave = line.slave(1).with_terms(Terms::of(Class::Command));
-    let call = tokio::spawn(async move { write(&mut slave, 8501, 15).await });
+    let call = writes(line.slave(1).with_terms(Terms::of(Class::Command)), 8501, 15);
     // Carried out, and its confirmation is lost.
     peer.request().await;
     peer.answer(&[0x86, 6]).await;
@@ -230,13 +194,11 @@ async fn a_write_whose_repetition_is_refused_after_a_lost_answer_has_an_unknown_
 async fn a_broadcast_waits_for_the_pause_of_every_slave() {
     let pause = SlaveSettings { turnaround: 50 * MS, ..SlaveSettings::default() };
     let (line, mut peer) = line(|config| config.slave(1, pause));
-    let mut one = line.slave(1);
-    let first = tokio::spawn(async move { read(&mut one, 0, 1).await });
+    let first = reads(line.slave(1), 0, 1);
     peer.answer(&[3, 2, 0, 1]).await;
     assert!(first.await.unwrap().is_ok());
     let answered = Instant::now();
-    let mut all = line.broadcast().with_terms(Terms::of(Class::Stop));
-    let stop = tokio::spawn(async move { write(&mut all, 1, 0).await });
+    let stop = writes(line.broadcast().with_terms(Terms::of(Class::Stop)), 1, 0);
     assert_eq!(peer.request().await[0], 0);
     assert!(answered.elapsed() >= 50 * MS, "{:?}", answered.elapsed());
     assert_eq!(stop.await.unwrap(), Ok(()));

@@ -4,7 +4,7 @@
 
 mod support;
 
-use std::time::Duration;
+use std::{iter, time::Duration};
 
 use drive_bus::LineConfig;
 use drive_core::{Class, PortError, Terms, serial::SerialSettings};
@@ -28,18 +28,15 @@ fn command() -> Terms {
 fn written(line: &mut ByHand) -> (Vec<u16>, Vec<(u32, Option<PortError>)>) {
     let (mut words, mut ended) = (Vec::new(), Vec::new());
     let until = line.now + Duration::from_secs(60);
-    while let Some(request) = line.next_sent(until) {
-        if request[1] == 6 {
-            words.push(u16::from_be_bytes([request[4], request[5]]));
-        }
-        while let Some((caller, outcome)) = line.ended() {
-            ended.push((caller, outcome.err()));
+    loop {
+        let request = line.next_sent(until);
+        let written = request.iter().filter(|request| request[1] == 6);
+        words.extend(written.map(|request| u16::from_be_bytes([request[4], request[5]])));
+        ended.extend(iter::from_fn(|| line.ended()).map(|(caller, outcome)| (caller, outcome.err())));
+        if request.is_none() {
+            return (words, ended);
         }
     }
-    while let Some((caller, outcome)) = line.ended() {
-        ended.push((caller, outcome.err()));
-    }
-    (words, ended)
 }
 
 #[test]

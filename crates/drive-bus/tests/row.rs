@@ -8,17 +8,12 @@ use std::{
     time::Duration,
 };
 
-use drive_bus::{Line, LineConfig, Slave, exchange::rtu};
-use drive_core::{Class, Port, SerialSettings, Terms};
-use support::{MS, read};
-use tokio::{
-    io::{AsyncReadExt, AsyncWriteExt},
-    time::sleep,
-};
+use drive_bus::{Line, Slave};
+use drive_core::Port;
+use support::{MS, doubling, read};
+use tokio::time::sleep;
 
-const SERIAL: SerialSettings = SerialSettings::MODBUS_DEFAULT;
-/// How long the far end takes for an answer, and how much later it says one of them once more.
-const RESPONSE: Duration = Duration::from_millis(12);
+/// How much later the far end says one of its answers once more.
 const AGAIN: Duration = Duration::from_millis(6);
 
 /// A far end: what its registers say, how often it was asked, and which of its answers it says twice.
@@ -29,44 +24,17 @@ struct FarEnd {
     doubles: Option<usize>,
 }
 
-/// A line with such a far end, whose times prove nothing.
+/// A line with such a far end.
 fn line(words: &[(u16, u16)]) -> (Line, Slave, Arc<Mutex<FarEnd>>) {
     let far_end =
         Arc::new(Mutex::new(FarEnd { words: words.iter().copied().collect(), ..FarEnd::default() }));
-    let (ours, far) = tokio::io::duplex(4_096);
-    let line = Line::over(ours, LineConfig { far_end_paces: Some(false), ..LineConfig::stream(SERIAL) });
-    let (mut from, mut to) = tokio::io::split(far);
-    let (say, mut said) = tokio::sync::mpsc::unbounded_channel::<Vec<u8>>();
-    tokio::spawn(async move {
-        while let Some(frame) = said.recv().await {
-            if to.write_all(&frame).await.is_err() {
-                return;
-            }
-        }
-    });
     let this = Arc::clone(&far_end);
-    tokio::spawn(async move {
-        let mut bytes = [0; 256];
-        while let Ok(8) = from.read(&mut bytes).await {
-            let (frame, twice) = {
-                let mut far_end = this.lock().unwrap();
-                let word = far_end.words[&u16::from_be_bytes([bytes[2], bytes[3]])];
-                let twice = far_end.doubles == Some(far_end.asked);
-                far_end.asked += 1;
-                (rtu::frame(1, &[&[3, 2][..], &word.to_be_bytes()].concat()).to_vec(), twice)
-            };
-            let say = say.clone();
-            tokio::spawn(async move {
-                sleep(RESPONSE).await;
-                let _ = say.send(frame.clone());
-                if twice {
-                    sleep(AGAIN).await;
-                    let _ = say.send(frame);
-                }
-            });
-        }
+    let (line, slave) = doubling::line(move |register| {
+        let mut far_end = this.lock().unwrap();
+        far_end.asked += 1;
+        let twice = far_end.doubles == Some(far_end.asked - 1);
+        (far_end.words[&register], twice.then_some(AGAIN))
     });
-    let slave = line.slave(1).with_terms(Terms::of(Class::Status));
     (line, slave, far_end)
 }
 

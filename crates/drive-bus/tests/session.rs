@@ -11,13 +11,12 @@ use std::{
 
 use drive_bus::{Line, LineConfig, OpenError, exchange::rtu};
 use drive_core::{Class, PortError, Terms, serial::SerialSettings};
-use support::MS;
+use support::{MS, read, reads, writes};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
     sync::mpsc,
     time::Instant,
 };
-use tokio_modbus::{Request, client::Client};
 
 /// A line whose port can be pulled and plugged: each opening gives its far end to the test, or fails while unplugged.
 fn pluggable() -> (Line, mpsc::UnboundedReceiver<DuplexStream>, Arc<Mutex<bool>>) {
@@ -44,65 +43,47 @@ async fn serve_one(port: &mut DuplexStream) -> Vec<u8> {
     bytes
 }
 
-async fn read(line: &Line, terms: Terms) -> Result<(), PortError> {
-    let request = Request::ReadHoldingRegisters(0, 1);
-    let outcome = line.slave(1).with_terms(terms).call(request).await;
-    outcome.map(|answer| assert!(answer.is_ok())).map_err(PortError::from_modbus)
-}
-
 #[tokio::test(start_paused = true)]
 async fn a_port_that_was_pulled_is_opened_again_and_the_line_goes_on() {
     let (line, mut opened, plugged) = pluggable();
-    let call = tokio::spawn({
-        let line = line.clone();
-        async move { read(&line, Terms::default()).await }
-    });
+    let call = reads(line.slave(1), 0, 1);
     let mut port = opened.recv().await.unwrap();
     serve_one(&mut port).await;
-    assert_eq!(call.await.unwrap(), Ok(()));
+    assert_eq!(call.await.unwrap(), Ok(vec![1]));
 
     *plugged.lock().unwrap() = false;
     drop(port);
     tokio::time::sleep(5_000 * MS).await;
-    assert!(matches!(read(&line, Terms::default()).await, Err(PortError::LineDown(_))));
+    assert!(matches!(read(&mut line.slave(1), 0, 1).await, Err(PortError::LineDown(_))));
 
     *plugged.lock().unwrap() = true;
     let mut port = opened.recv().await.unwrap();
     tokio::time::sleep(MS).await;
-    let call = tokio::spawn({
-        let line = line.clone();
-        async move { read(&line, Terms::default()).await }
-    });
+    let call = reads(line.slave(1), 0, 1);
     // The first answer is thrown away.
     serve_one(&mut port).await;
     serve_one(&mut port).await;
-    assert_eq!(call.await.unwrap(), Ok(()));
+    assert_eq!(call.await.unwrap(), Ok(vec![1]));
     assert_eq!((line.stats().opened, line.stats().lost), (2, 1));
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_short_interruption_costs_a_waiting_read_nothing() {
     let (line, mut opened, _plugged) = pluggable();
-    let call = tokio::spawn({
-        let line = line.clone();
-        async move { read(&line, Terms::default()).await }
-    });
+    let call = reads(line.slave(1), 0, 1);
     let mut port = opened.recv().await.unwrap();
     let mut bytes = [0; 64];
     assert!(port.read(&mut bytes).await.unwrap() > 0);
     drop(port);
     let mut port = opened.recv().await.unwrap();
     serve_one(&mut port).await;
-    assert_eq!(call.await.unwrap(), Ok(()));
+    assert_eq!(call.await.unwrap(), Ok(vec![1]));
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_write_under_way_when_the_port_is_lost_is_never_sent_again() {
     let (line, mut opened, _plugged) = pluggable();
-    let call = tokio::spawn({
-        let mut slave = line.slave(1);
-        async move { slave.call(Request::WriteSingleRegister(8501, 15)).await.map_err(PortError::from_modbus) }
-    });
+    let call = writes(line.slave(1), 8501, 15);
     let mut port = opened.recv().await.unwrap();
     let mut bytes = [0; 64];
     assert!(port.read(&mut bytes).await.unwrap() > 0);
@@ -118,17 +99,10 @@ async fn a_command_that_waits_when_the_port_is_lost_is_never_sent_to_whoever_ans
     let (line, mut opened, _plugged) = pluggable();
     let mut port = opened.recv().await.unwrap();
     // The line is busy, so that the command waits; then the port goes.
-    let busy = tokio::spawn({
-        let line = line.clone();
-        async move { read(&line, Terms::default()).await }
-    });
+    let busy = reads(line.slave(1), 0, 1);
     let mut bytes = [0; 64];
     assert!(port.read(&mut bytes).await.unwrap() > 0);
-    let command = tokio::spawn({
-        let terms = Terms::of(Class::Command).within(1_000 * MS);
-        let mut slave = line.slave(2).with_terms(terms);
-        async move { slave.call(Request::WriteSingleRegister(8501, 15)).await.map_err(PortError::from_modbus) }
-    });
+    let command = writes(line.slave(2).with_terms(Terms::of(Class::Command).within(1_000 * MS)), 8501, 15);
     tokio::task::yield_now().await;
     let mut losses = line.slave(2).port_losses();
     // It is plugged in again at once.
@@ -138,7 +112,7 @@ async fn a_command_that_waits_when_the_port_is_lost_is_never_sent_to_whoever_ans
     assert_eq!(*losses.borrow_and_update(), 1);
     let mut port = opened.recv().await.unwrap();
     serve_one(&mut port).await;
-    assert_eq!(busy.await.unwrap(), Ok(()), "a read waits");
+    assert_eq!(busy.await.unwrap(), Ok(vec![1]), "a read waits");
     let sent = tokio::time::timeout(5_000 * MS, port.read(&mut bytes)).await;
     assert!(sent.is_err(), "{sent:?}");
 }
@@ -146,16 +120,13 @@ async fn a_command_that_waits_when_the_port_is_lost_is_never_sent_to_whoever_ans
 #[tokio::test(start_paused = true)]
 async fn one_bad_frame_never_closes_the_port() {
     let (line, mut opened, _plugged) = pluggable();
-    let call = tokio::spawn({
-        let line = line.clone();
-        async move { read(&line, Terms::default()).await }
-    });
+    let call = reads(line.slave(1), 0, 1);
     let mut port = opened.recv().await.unwrap();
     let mut bytes = [0; 64];
     assert!(port.read(&mut bytes).await.unwrap() > 0);
     port.write_all(&[1, 3, 2, 0, 1, 0xBA, 0xD0]).await.unwrap();
     serve_one(&mut port).await;
-    assert_eq!(call.await.unwrap(), Ok(()));
+    assert_eq!(call.await.unwrap(), Ok(vec![1]));
     assert_eq!(line.stats().opened, 1);
 }
 
@@ -201,15 +172,12 @@ async fn a_port_in_use_is_named_and_a_free_one_serves() {
     let error = Line::open(config).await.unwrap_err();
     assert_eq!(error, OpenError::InUse { path: path.into() });
 
-    let call = tokio::spawn({
-        let line = line.clone();
-        async move { read(&line, Terms::default()).await }
-    });
+    let call = reads(line.slave(1), 0, 1);
     let mut request = [0; 8];
     far.read_exact(&mut request).await.unwrap();
     assert_eq!(request[..], rtu::frame(1, &[3, 0, 0, 0, 1])[..]);
     far.write_all(&rtu::frame(1, &[3, 2, 0, 1])).await.unwrap();
-    assert_eq!(call.await.unwrap(), Ok(()));
+    assert_eq!(call.await.unwrap(), Ok(vec![1]));
     line.close().await;
 }
 
@@ -233,14 +201,7 @@ async fn a_port_without_an_rs485_mode_says_so() {
 #[tokio::test(start_paused = true)]
 async fn an_answer_that_was_on_its_way_when_the_port_was_lost_is_never_taken_for_the_next() {
     let (line, mut opened, _plugged) = pluggable();
-    let call = |address| {
-        let mut slave = line.slave(1);
-        tokio::spawn(async move {
-            let answer = slave.call(Request::ReadHoldingRegisters(address, 1)).await;
-            answer.map_err(PortError::from_modbus)
-        })
-    };
-    let first = call(7);
+    let first = reads(line.slave(1), 7, 1);
     let mut port = opened.recv().await.unwrap();
     let mut bytes = [0; 64];
     assert!(port.read(&mut bytes).await.unwrap() > 0);
@@ -248,13 +209,12 @@ async fn an_answer_that_was_on_its_way_when_the_port_was_lost_is_never_taken_for
     first.abort();
     drop(port);
     let mut port = opened.recv().await.unwrap();
-    let second = call(8);
+    let second = reads(line.slave(1), 8, 1);
     // What a serial server still has of the line it gives to the next connection.
     let late = rtu::frame(1, &[3, 2, 0xAA, 0xAA]);
     tokio::time::sleep(10 * MS).await;
     port.write_all(&late).await.unwrap();
     serve_one(&mut port).await;
-    let answer = second.await.unwrap().unwrap();
-    assert_eq!(answer, Ok(tokio_modbus::Response::ReadHoldingRegisters(vec![1])));
+    assert_eq!(second.await.unwrap(), Ok(vec![1]));
     assert_eq!(line.stats().slaves[&1].late, 1);
 }

@@ -6,7 +6,7 @@ mod support;
 
 use std::time::Duration;
 
-use drive_bus::{LineConfig, SlaveSettings, exchange::rtu};
+use drive_bus::{Gateway, LineConfig, SlaveSettings, exchange::rtu};
 use drive_core::{Class, Terms, serial::SerialSettings};
 use support::{MS, by_hand::ByHand};
 use tokio_modbus::Request;
@@ -286,4 +286,32 @@ fn the_first_stop_of_a_drive_that_is_off_line_waits_for_no_share() {
     let next = line.sent();
     assert_eq!(next[..2], [2, 6]);
     assert!(line.now - called <= config().worst_case_stop(8, 8));
+}
+
+/// A fifth of the line is for stops in vain: each holds the others up for as long as the gateway waits for its drive, and the next
+/// follows four times as long behind it, however many were in vain before.
+#[test]
+fn behind_a_gateway_a_stop_waits_for_the_share_of_one_in_vain_and_not_of_all_before_it() {
+    for wait in [None, Some(Duration::from_secs(1)), Some(Duration::from_secs(20))] {
+        let gateway = Gateway { wait, ..Gateway::default() };
+        let longest = (wait.unwrap_or(Gateway::ASSUMED_WAIT) * 4).min(Duration::from_secs(30));
+        for later in 0..40 {
+            let mut line =
+                ByHand::new(LineConfig { gateway: Some(gateway), ..LineConfig::modbus_tcp("gateway:502") });
+            let pass = |line: &mut ByHand, time: Duration| {
+                let until = line.now + time;
+                while line.next_sent(until).is_some() {}
+                line.now = until;
+            };
+            for caller in 0..12 {
+                line.ask(caller, 3, STOP, stop());
+                pass(&mut line, 500 * MS);
+            }
+            pass(&mut line, Duration::from_secs(5) * later);
+            let called = line.now;
+            line.ask(12, 3, STOP, stop());
+            while line.next_sent(called + Duration::from_secs(300)).expect("it is sent")[7] != 6 {}
+            assert!(line.now - called <= longest, "{:?}, {later}, {wait:?}", line.now - called);
+        }
+    }
 }

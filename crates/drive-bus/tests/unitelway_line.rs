@@ -16,11 +16,10 @@ use drive_bus::{
 use drive_core::{Class, Port, PortError, Terms};
 use drive_unitelway::{data_frame, poll};
 use support::{
-    MS,
+    MS, calls,
     unitelway::{ACK, EOT, NAK, READ, WRITE, WRITTEN, serial},
 };
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
-use tokio_modbus::client::Client;
 
 /// A reply of slave 1 with the standard header.
 fn reply(unite: &[u8]) -> Bytes {
@@ -80,16 +79,14 @@ fn line(change: impl FnOnce(LineConfig) -> LineConfig) -> (Line, Peer) {
 #[tokio::test(start_paused = true)]
 async fn an_edge_whose_acknowledgement_is_lost_has_an_unknown_outcome_and_is_sent_once() {
     let (line, mut peer) = line(|config| config);
-    let slave = line.slave(1);
-    let mut edge = slave.clone().with_terms(Terms::of(Class::Command).within(Duration::from_secs(9)).edge());
-    let call = tokio::spawn(async move { edge.call(WRITE).await });
+    let terms = Terms::of(Class::Command).within(Duration::from_secs(9));
+    let call = calls(line.slave(1).with_terms(terms.edge()), WRITE);
     peer.mirrors().await;
     let lost = PortError::from_modbus(call.await.unwrap().unwrap_err());
     assert_eq!(lost, PortError::OutcomeUnknown("no answer"));
 
     // A level is sent again, after the late window and once the slave holds nothing any more.
-    let mut level = slave.with_terms(Terms::of(Class::Command).within(Duration::from_secs(9)));
-    let call = tokio::spawn(async move { level.call(WRITE).await });
+    let call = calls(line.slave(1).with_terms(terms), WRITE);
     let first = peer.mirrors().await;
     assert_eq!(peer.takes_request().await, first);
     peer.gives_reply(&[0xFE]).await;
@@ -158,11 +155,10 @@ async fn a_line_that_speaks_modbus_sends_no_unite_request() {
 async fn a_stop_waits_no_longer_than_the_line_says_behind_an_exchange_where_everything_goes_wrong() {
     let (line, mut peer) = line(|config| LineConfig { retries: 0, ..config });
     let bound = line.worst_case_stop();
-    let (mut slave, mut stop) = (line.slave(1), line.slave(2).with_terms(Terms::of(Class::Stop)));
-    let read = tokio::spawn(async move { slave.call(READ).await });
+    let read = calls(line.slave(1), READ);
     let request = peer.mirrors().await;
     let called = tokio::time::Instant::now();
-    let stopped = tokio::spawn(async move { stop.call(WRITE).await });
+    let stopped = calls(line.slave(2).with_terms(Terms::of(Class::Stop)), WRITE);
     // Slow words, and our acknowledgement of the reply is not heard.
     tokio::time::sleep(90 * MS).await;
     peer.says(ACK).await;
@@ -185,10 +181,9 @@ async fn a_stop_waits_no_longer_than_the_line_says_behind_an_exchange_where_ever
 #[tokio::test(start_paused = true)]
 async fn while_one_slave_is_not_ready_the_others_are_served() {
     let (line, mut peer) = line(|config| config);
-    let (mut slow, mut quick) = (line.slave(1), line.slave(2));
-    let waiting = tokio::spawn(async move { slow.call(READ).await });
+    let waiting = calls(line.slave(1), READ);
     peer.takes_request().await;
-    let read = tokio::spawn(async move { quick.call(READ).await });
+    let read = calls(line.slave(2), READ);
     assert_eq!(peer.hears().await, *poll(1));
     peer.says(EOT).await;
     assert_eq!(peer.hears().await[..3], [0x10, 0x02, 2], "the other one's turn");
@@ -202,12 +197,10 @@ async fn while_one_slave_is_not_ready_the_others_are_served() {
 #[tokio::test(start_paused = true)]
 async fn a_stop_goes_at_once_to_a_slave_that_owes_a_reply_and_is_sent_again_behind_a_number() {
     let (line, mut peer) = line(|config| config);
-    let mut read = line.slave(1);
-    let read = tokio::spawn(async move { read.call(READ).await });
+    let read = calls(line.slave(1), READ);
     peer.takes_request().await;
     assert_eq!(peer.hears().await, *poll(1));
-    let mut stop = line.slave(1).with_terms(Terms::of(Class::Stop));
-    let stop = tokio::spawn(async move { stop.call(WRITE).await });
+    let stop = calls(line.slave(1).with_terms(Terms::of(Class::Stop)), WRITE);
     tokio::time::sleep(MS).await;
     peer.says(EOT).await;
     let written = peer.hears().await;
@@ -227,8 +220,7 @@ async fn a_stop_goes_at_once_to_a_slave_that_owes_a_reply_and_is_sent_again_behi
 #[tokio::test(start_paused = true)]
 async fn a_slave_that_does_nothing_but_refuse_is_busy_and_then_off_line() {
     let (line, mut peer) = line(|config| config);
-    let mut slave = line.slave(1);
-    let read = tokio::spawn(async move { slave.call(READ).await });
+    let read = calls(line.slave(1), READ);
     let mut frames = 0;
     while !read.is_finished() {
         let heard = tokio::time::timeout(200 * MS, peer.hears()).await;

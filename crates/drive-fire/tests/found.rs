@@ -159,6 +159,7 @@ fn no_order_of_a_line_that_was_a_find_is_one_again() {
         ),
         ("Wire", "fjekiiaail", "a repeated stop sent into another's late answer"),
         ("Wire", "famiikjll", "an answer later than its window, which nobody can tell: the model was wrong"),
+        ("Wire", "faijdkfhfhfamhjml", "the same of a read of which answers of all lengths are owed"),
         ("Wire", "aheiiijialfmiikmlfccmijiajl", "a late answer whose check ends with 00h"),
         ("Gateway", "aaaaaaaaaaaaaaaaa", "seventeen stops in vain end after 300 s: the model was wrong"),
         ("Gateway", &"a".repeat(60), "the same of sixty"),
@@ -193,6 +194,11 @@ fn no_order_of_a_gateway_that_was_a_find_is_one_again() {
         ),
         ("Unknown", "ffgbbihgjgijadgj", "the only probe went to a drive that nobody asked for"),
         ("Silent", &*"f".repeat(30), "thirty stops in vain end after two minutes: the model was wrong"),
+        (
+            "Unknown",
+            "ffffffffffffjjjjjjjjjjf",
+            "the thirteenth of thirteen stops in vain waited for the shares of all",
+        ),
         ("Unknown", "hcdhjgde", "a timeout of a second, learned behind what a lost connection had asked"),
     ] {
         assert_eq!(Model::named("gateway").expect("it is one").again(setting, steps), Ok(()), "{what}");

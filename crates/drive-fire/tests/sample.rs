@@ -84,6 +84,16 @@ mod planted {
         }
     }
 
+    /// What can be told is no less found for what cannot: here the late answer is of the one length that is owed.
+    #[test]
+    fn an_answer_later_than_its_window_to_a_read_that_can_differ_is_found_where_nobody_fears_it() {
+        let again = || model::Model::named("master").expect("it is one").again("Wire", "fiml");
+        assert_eq!(again(), Ok(()));
+        let _chosen = drive_bus::mutants::choose("late-answer-unfeared");
+        let found = again().expect_err("it is taken");
+        assert!(found.contains("a value is the answer to its own question"), "{found}");
+    }
+
     #[test]
     fn the_models_find_what_is_planted() {
         for name in ["master", "gateway"] {

@@ -51,40 +51,22 @@ const CODES: usize = 8;
 
 impl Lately {
     fn counts(&mut self) -> [&mut u32; 15] {
-        let Self {
-            questions,
-            whole,
-            silent,
-            without_first,
-            without_last,
-            damaged,
-            damaged_long,
-            damaged_begun,
-            behind,
-            late,
-            late_with_next,
-            early,
-            doubled,
-            contradicted,
-            acknowledged,
-            ..
-        } = self;
         [
-            questions,
-            whole,
-            silent,
-            without_first,
-            without_last,
-            damaged,
-            damaged_long,
-            damaged_begun,
-            behind,
-            late,
-            late_with_next,
-            early,
-            doubled,
-            contradicted,
-            acknowledged,
+            &mut self.questions,
+            &mut self.whole,
+            &mut self.silent,
+            &mut self.without_first,
+            &mut self.without_last,
+            &mut self.damaged,
+            &mut self.damaged_long,
+            &mut self.damaged_begun,
+            &mut self.behind,
+            &mut self.late,
+            &mut self.late_with_next,
+            &mut self.early,
+            &mut self.doubled,
+            &mut self.contradicted,
+            &mut self.acknowledged,
         ]
     }
 

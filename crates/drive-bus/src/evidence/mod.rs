@@ -19,6 +19,7 @@ use self::{
     hearing::{Aside, Hearing},
     lately::Lately,
 };
+use crate::exchange::Answer;
 
 /// So many facts are kept.
 const FACTS: usize = 64;
@@ -100,14 +101,24 @@ pub(crate) struct Evidence {
 /// How an exchange ended, as far as that is evidence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Ended {
-    /// With an answer of so many bytes of PDU.
-    Answered(usize),
+    /// With an answer.
+    Answered,
     /// With an exception.
     Exception(u8),
     /// With something that is no answer for certain, and was whole.
     Unclear,
     /// In vain.
     InVain,
+}
+
+impl Ended {
+    /// As this answer says.
+    pub(crate) fn with(answer: &Answer) -> Self {
+        match answer {
+            Ok(_) => Self::Answered,
+            Err(code) => Self::Exception(u8::from(*code)),
+        }
+    }
 }
 
 impl Evidence {
@@ -172,10 +183,8 @@ impl Evidence {
         let (came, question) = hearing.take();
         let is_early = std::mem::take(&mut hearing.early);
         hearing.in_vain = Some(slave).filter(|_| ended == Ended::InVain);
-        if let Ended::Answered(len) = ended
-            && is_rtu
-        {
-            hearing.answered(now, slave, &came, len);
+        if is_rtu && ended == Ended::Answered {
+            hearing.answered(now, slave, &came, expected);
         }
         let instead = (is_rtu && ended == Ended::InVain)
             .then(|| bytes::told(&came, slave, expected, is_early))
@@ -186,7 +195,7 @@ impl Evidence {
             let lately = self.slaves.entry(slave).or_default();
             lately.asked();
             match ended {
-                Ended::Answered(_) => {
+                Ended::Answered => {
                     lately.whole += 1;
                     lately.answered(now);
                     lately.came_whole(question.key);

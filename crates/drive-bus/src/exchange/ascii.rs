@@ -334,10 +334,6 @@ impl Machine for Ascii {
         std::mem::take(&mut self.strays)
     }
 
-    fn confuses_late_answers(&self) -> bool {
-        true
-    }
-
     fn taken(&self) -> Option<Frame> {
         self.taken
     }

@@ -30,6 +30,9 @@ pub(crate) const NOBODY_ANSWERED: u8 = 0x0B;
 /// What a slave said: data, or its refusal.
 pub type Answer = Result<Response, ExceptionCode>;
 
+/// What an exchange brought: an answer, or why none.
+pub type Brought = Result<Answer, Failure>;
+
 /// What an exchange wants next.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
@@ -40,7 +43,7 @@ pub enum Step {
     /// The line is free for other slaves until this time, when [`Machine::resume`] goes on.
     Wait(Instant),
     /// Nothing: it is over.
-    Done(Result<Answer, Failure>),
+    Done(Brought),
 }
 
 /// Why an exchange brought no answer.
@@ -200,8 +203,10 @@ pub trait Machine: Send {
     fn take_strays(&mut self) -> Vec<Stray>;
 
     /// Whether a late answer can be taken for the answer to a later request, so that a slave must be left alone after a
-    /// timeout.
-    fn confuses_late_answers(&self) -> bool;
+    /// timeout: where the protocol has no numbers.
+    fn confuses_late_answers(&self) -> bool {
+        true
+    }
 
     /// The shape of the answer to a request with this PDU. Requests whose answers have one shape wait for each other's
     /// late answers.

@@ -212,10 +212,6 @@ impl Machine for Rtu {
         std::mem::take(&mut self.strays)
     }
 
-    fn confuses_late_answers(&self) -> bool {
-        true
-    }
-
     fn taken(&self) -> Option<Frame> {
         self.taken
     }

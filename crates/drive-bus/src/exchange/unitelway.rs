@@ -167,10 +167,6 @@ impl Machine for UniTelway {
         self.link.take_strays().into_iter().map(translated).collect()
     }
 
-    fn confuses_late_answers(&self) -> bool {
-        true
-    }
-
     /// Of any reply it is unknown which request it belongs to.
     fn shape(&self, _: &[u8]) -> Shape {
         Shape::ANY

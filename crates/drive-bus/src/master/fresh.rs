@@ -11,7 +11,7 @@ use std::{collections::VecDeque, time::Duration};
 
 use tokio::time::Instant;
 
-use super::{Master, Purpose, port::PortState};
+use super::{Master, port::PortState};
 use crate::{config::DOUBLE, shape::Shape, stats::NOTHING_HEARD};
 
 /// How long a port that was opened again is listened to: a server that has kept something gives it in a round trip.
@@ -193,12 +193,5 @@ impl<C> Master<C> {
         let gateway = self.far_end.wait() * 5 / 4 + self.config.response_timeout / 2;
         let mute = MUTE.max(calls).max(gateway);
         (mute * (1 << self.fresh.reopened.min(8))).min(LONGEST_MUTE.max(mute))
-    }
-}
-
-impl<C> Purpose<C> {
-    /// Whether its answer is thrown away.
-    pub(super) const fn is_thrown_away(&self) -> bool {
-        matches!(self, Self::ThrowAway)
     }
 }

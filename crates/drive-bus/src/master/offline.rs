@@ -9,6 +9,9 @@ use tokio::time::Instant;
 /// the living.
 const STOP_REST: u32 = 4;
 
+/// But for no longer than this: whoever asks for the next may be a person who sees the motor turn.
+const LONGEST_STOP_REST: Duration = Duration::from_secs(30);
+
 /// Those that are off-line: the one place that knows.
 #[derive(Debug, Default)]
 pub(super) struct Offline {
@@ -97,11 +100,11 @@ impl Offline {
         }
     }
 
-    /// A stop to it has failed and took so much of the line.
+    /// A stop to it has failed, and held the others up for so long by itself.
     pub(super) fn stop_failed(&mut self, now: Instant, slave: u8, took: Duration) {
         if let Some(lost) = self.slaves.get_mut(&slave) {
             lost.stopped_in_vain = true;
-            self.stop_at = Some(now + took * STOP_REST);
+            self.stop_at = Some(now + (took * STOP_REST).min(LONGEST_STOP_REST));
         }
     }
 

@@ -6,7 +6,10 @@ use std::{collections::BTreeMap, time::Duration};
 use drive_core::Class;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use super::{BOUNDS, ClassStats, Histogram, OCTAVES, SUB, Spread, count_at, end_of, nanos};
+use super::{
+    BOUNDS, ClassStats, Histogram, Spread,
+    histogram::{OCTAVES, SUB, count_at, end_of, nanos},
+};
 
 /// A histogram as it is written.
 #[derive(Serialize, Deserialize)]

@@ -29,6 +29,21 @@ impl ByHand {
         Self { master, now: now + Duration::from_secs(1), config }
     }
 
+    /// A line whose slave 1 was asked this for so long in vain.
+    pub(crate) fn after_a_question_in_vain(
+        config: LineConfig,
+        request: Request<'static>,
+        terms: Terms,
+        time: Duration,
+    ) -> Self {
+        let mut line = Self::new(config);
+        line.ask(1, 1, request, terms);
+        line.sent();
+        line.sends_nothing_for(time);
+        assert!(line.ended().is_some_and(|(_, outcome)| outcome.is_err()));
+        line
+    }
+
     pub(crate) fn ask(&mut self, caller: u32, slave: u8, request: Request<'static>, terms: Terms) {
         self.submit(caller, slave, request, terms).expect("the line takes it");
     }
@@ -65,6 +80,13 @@ impl ByHand {
     /// What is sent next, within a minute.
     pub(crate) fn sent(&mut self) -> Vec<u8> {
         self.next_sent(self.now + Duration::from_secs(60)).expect("something is sent")
+    }
+
+    /// Nothing is sent for so long.
+    pub(crate) fn sends_nothing_for(&mut self, time: Duration) {
+        let until = self.now + time;
+        assert_eq!(self.next_sent(until), None);
+        self.now = until;
     }
 
     /// Bytes that end on the line `after` from now, with what the line does until then.

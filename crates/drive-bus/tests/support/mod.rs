@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test file uses its part")]
 
 pub(crate) mod by_hand;
+pub(crate) mod doubling;
 pub(crate) mod rig;
 pub(crate) mod script;
 #[cfg(feature = "tcp")]
@@ -20,11 +21,15 @@ use drive_bus::{Line, LineConfig, Slave, exchange::rtu};
 use drive_core::{PortError, serial::SerialSettings};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
+    task::JoinHandle,
     time::{Instant, sleep, sleep_until},
 };
 use tokio_modbus::{Request, Response, client::Client};
 
 pub(crate) const MS: Duration = Duration::from_millis(1);
+
+/// How a call ends.
+pub(crate) type Called = tokio_modbus::Result<Response>;
 
 /// One line at 19200 8E1 and the far end of its stream.
 pub(crate) fn line(change: impl FnOnce(LineConfig) -> LineConfig) -> (Line, Peer) {
@@ -104,6 +109,25 @@ pub(crate) async fn write(slave: &mut Slave, address: u16, word: u16) -> Result<
         Ok(other) => panic!("{other:?}"),
         Err(error) => Err(PortError::from_modbus(error)),
     }
+}
+
+/// A call that goes on by itself.
+pub(crate) fn calls(mut slave: Slave, request: Request<'static>) -> JoinHandle<Called> {
+    tokio::spawn(async move { slave.call(request).await })
+}
+
+/// The same read, that goes on by itself.
+pub(crate) fn reads(
+    mut slave: Slave,
+    address: u16,
+    quantity: u16,
+) -> JoinHandle<Result<Vec<u16>, PortError>> {
+    tokio::spawn(async move { read(&mut slave, address, quantity).await })
+}
+
+/// The same write, that goes on by itself.
+pub(crate) fn writes(mut slave: Slave, address: u16, word: u16) -> JoinHandle<Result<(), PortError>> {
+    tokio::spawn(async move { write(&mut slave, address, word).await })
 }
 
 /// The time of so many characters at 19200 8E1.

@@ -1,6 +1,6 @@
 //! Small cases of the master of a line, on a wire and behind a gateway.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{collections::BTreeMap, ops::RangeInclusive, time::Duration};
 
 use drive_bus::{
     Gateway, LineConfig, SlaveSettings,
@@ -39,8 +39,12 @@ const RESPONSE: Duration = Duration::from_millis(5);
 const LIFETIME: Duration = Duration::from_millis(1_000);
 /// Behind the last step so much time passes, in which everything ends.
 const AFTER: Duration = Duration::from_secs(300);
-/// And so much more for each call: a stop in vain behind others in vain has a share of the line that grows with what a gateway owes.
+/// And so much more for each call: a stop in vain has its share of the line.
 const AFTER_EACH: Duration = Duration::from_secs(30);
+/// The words of a read, and with as many more as its drive may be asked for along.
+const LENGTHS: RangeInclusive<u8> = 2..=5;
+/// So long a length is asked for last of all that is owed (drive-bus' README, *Doubt*).
+const MEMORY: Duration = Duration::from_secs(60);
 
 /// One step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -155,6 +159,13 @@ struct UnderWay {
     call: Option<u32>,
 }
 
+impl UnderWay {
+    /// Whose it is, and how many words it reads.
+    fn read(&self) -> (u8, u8) {
+        (self.slave, if self.pdu[0] == 3 { self.pdu[4] } else { 0 })
+    }
+}
+
 struct World {
     master: Master<u32>,
     config: LineConfig,
@@ -177,6 +188,10 @@ struct World {
     beyond_its_window: Option<u16>,
     /// A read was refused, so that it is not lengthened any more.
     refuses_longer: bool,
+    /// Reads of which no right answer has come: whose, of how many words, and until when that is remembered.
+    owed: BTreeMap<(u8, u8), Instant>,
+    /// Answers of all lengths were owed when the read under way was sent, so that it has none of its own.
+    has_no_own_length: bool,
 }
 
 impl World {
@@ -201,6 +216,8 @@ impl World {
             setpoint: 0,
             beyond_its_window: None,
             refuses_longer: false,
+            owed: BTreeMap::new(),
+            has_no_own_length: false,
         }
     }
 
@@ -265,6 +282,7 @@ impl World {
                     }
                     let at = self.now.max(self.quiet_from) + RESPONSE + SERIAL.characters(frame.len());
                     self.answered_at.insert(late.slave, at);
+                    self.owed.remove(&late.read());
                     self.hears(at, &frame)?;
                 }
             }
@@ -332,6 +350,9 @@ impl World {
             return Ok(());
         }
         self.refuses_longer |= how == S::Refuse && asked.pdu[0] == 3;
+        if how != S::Damage {
+            self.owed.remove(&asked.read());
+        }
         let pdu = match how {
             S::Refuse => vec![asked.pdu[0] | 0x80, 4],
             _ => Self::answer_of(&asked),
@@ -492,7 +513,11 @@ impl Clocked for World {
         let number = self.number;
         self.number += 1;
         let call = self.call_of(slave, &pdu, is_stop)?;
-        self.under_way = Some(UnderWay { slave, pdu, end, number, call });
+        let under_way = UnderWay { slave, pdu, end, number, call };
+        let is_owed = |words: u8| self.owed.get(&(slave, words)).is_some_and(|until| self.now < *until);
+        self.has_no_own_length = LENGTHS.clone().all(is_owed);
+        self.owed.insert(under_way.read(), end + MEMORY);
+        self.under_way = Some(under_way);
         Ok(())
     }
 
@@ -514,9 +539,10 @@ impl Clocked for World {
             match &outcome {
                 Ok(Ok(Response::ReadHoldingRegisters(words))) => {
                     let number = words[0] / 16;
-                    // To a read that its drive refuses to have lengthened, what comes later than the late window cannot be told from
-                    // its own answer (drive-bus' README).
-                    let cannot_be_told = self.refuses_longer && self.beyond_its_window == Some(number);
+                    // To a read that cannot differ from what is owed, what comes later than the late window cannot be told from its
+                    // own answer (drive-bus' README): its drive refuses to have it lengthened, or all its lengths are owed.
+                    let cannot_be_told = (self.refuses_longer || self.has_no_own_length)
+                        && self.beyond_its_window == Some(number);
                     if usize::from(number) + 1 != usize::from(self.number) && !cannot_be_told {
                         return Err("a value is the answer to its own question");
                     }
