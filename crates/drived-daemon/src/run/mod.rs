@@ -7,6 +7,7 @@ mod faces;
 mod here;
 mod json;
 mod notify;
+mod own;
 mod picture;
 mod profiles;
 mod reload;
@@ -97,6 +98,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
         tracing::warn!("{doubt}");
     }
     descriptors::check(config.lines.len())?;
+    let own = own::take(config.doors.state.folder.as_deref())?;
     // What is wrong with the doors is told before a drive is spoken to.
     let doors = Doors::prepare(config.doors.clone().with(args.http, args.socket)?)?;
     let faces = faces::prepare(&config, |_| true)?;
@@ -233,6 +235,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     for (_, line) in fleet.lines() {
         closing::close(&line).await;
     }
+    drop(own);
     ended.and(read.unwrap_or(Ok(())))
 }
 

@@ -72,10 +72,11 @@ impl Head {
 }
 
 impl File {
-    /// The file at a path, made if there is none.
+    /// The file at a path, made if there is none. One on a disk that is only read is written once that takes it again: as on a full one,
+    /// motors may turn that have to be stopped.
     pub(super) fn open(path: &Path) -> io::Result<Self> {
         let kept = Kept::at(path);
-        kept.open_to_append()?;
+        writable_or_only_read(kept.open_to_append())?;
         let key = Key::of_or_new(&kept)?;
         // One that says nothing any more is found by who looks whether it is whole.
         let last = Head::of(&kept, &key).ok().flatten();
@@ -97,7 +98,7 @@ impl File {
     /// The file of what was refused.
     pub(super) fn open_refused(path: &Path) -> io::Result<Self> {
         let kept = Kept::at(path);
-        kept.open_to_append()?;
+        writable_or_only_read(kept.open_to_append())?;
         Ok(Self::of(kept, LARGEST_REFUSED, 1, None))
     }
 
@@ -203,6 +204,13 @@ impl File {
             }
             _ => None,
         })
+    }
+}
+
+fn writable_or_only_read(opened: io::Result<fs::File>) -> io::Result<()> {
+    match opened {
+        Err(error) if error.kind() == io::ErrorKind::ReadOnlyFilesystem => Ok(()),
+        opened => opened.map(drop),
     }
 }
 
