@@ -38,6 +38,7 @@ const EACH: Duration = Duration::from_micros(8);
 const SETTLES_FOR: Duration = Duration::from_secs(600);
 
 /// The drives that a command is for, and by which id they are asked.
+#[derive(Clone)]
 pub(super) struct Meant {
     id: String,
     group: Group,
@@ -52,6 +53,50 @@ impl Meant {
 
     pub(super) fn drives(&self) -> &[DriveHandle] {
         self.group.members()
+    }
+
+    /// The command before anything is known of any of them.
+    pub(super) fn pending(&self, caller: &Caller, request: &Request) -> CommandView {
+        let pending = self.drives().len();
+        let several = SeveralView {
+            drives: Vec::new(),
+            confirmed: 0,
+            pending,
+            not_reachable: 0,
+            refused: 0,
+            failed: 0,
+        };
+        CommandView { several: Some(several), ..self.head(caller, request) }
+    }
+
+    /// What holds for all of them.
+    fn head(&self, caller: &Caller, request: &Request) -> CommandView {
+        let (group, selected) = match &request.target {
+            Target::Group(name) => (Some(name.clone()), Vec::new()),
+            Target::Selected(names) => (None, names.clone()),
+            Target::Drive(_) | Target::All => (None, Vec::new()),
+        };
+        CommandView {
+            id: self.id.clone(),
+            drive: None,
+            group,
+            selected,
+            action: request.action.word(),
+            command: request.action.text(),
+            caller: caller.name.clone(),
+            origin: caller.origin.clone(),
+            outcome: OutcomeWord::Pending,
+            open: true,
+            reason: None,
+            text: None,
+            time_unix_ms: unix(request.arrived),
+            took_ms: None,
+            status: None,
+            counted: None,
+            started: None,
+            stop: None,
+            several: None,
+        }
     }
 
     /// Stops them, if that is what was asked.
@@ -95,30 +140,11 @@ pub(super) enum Posted {
 
 impl Work {
     pub(super) fn new(plant: Plant, caller: &Caller, request: &Request, meant: Meant) -> Self {
-        let Meant { id, group } = meant;
-        let head = CommandView {
-            id,
-            drive: None,
-            group: None,
-            selected: Vec::new(),
-            action: request.action.word(),
-            command: request.action.text(),
-            caller: caller.name.clone(),
-            origin: caller.origin.clone(),
-            outcome: OutcomeWord::Pending,
-            open: true,
-            reason: None,
-            text: None,
-            time_unix_ms: unix(request.arrived),
-            took_ms: None,
-            status: None,
-            counted: None,
-            started: None,
-            stop: None,
-            several: None,
-        };
+        let head = meant.head(caller, request);
+        let group = meant.group;
+        let of_one = CommandView { group: None, selected: Vec::new(), ..head.clone() };
         let part = |member: &DriveHandle| {
-            let part = CommandView { drive: Some(member.name().to_string()), ..head.clone() };
+            let part = CommandView { drive: Some(member.name().to_string()), ..of_one.clone() };
             match (request.action, member.settings().control) {
                 // A stop of several goes to those that may be commanded, and the others are accounted for at once.
                 (Action::Stop(_), false) if request.target != Target::Drive(member.name().to_string()) => {
@@ -129,11 +155,6 @@ impl Work {
         };
         let parts = group.members().iter().map(|member| Arc::new(part(member))).collect();
         let parts = Mutex::new(parts);
-        let head = match &request.target {
-            Target::Group(name) => CommandView { group: Some(name.clone()), ..head },
-            Target::Selected(names) => CommandView { selected: names.clone(), ..head },
-            Target::Drive(_) | Target::All => head,
-        };
         let request = request.clone();
         let numbers = group.members().iter().map(|member| Arc::clone(member.name())).zip(0..).collect();
         Self(Arc::new(Inner { plant, request, group, numbers, parts, changed: Notify::new(), head }))
@@ -176,7 +197,7 @@ impl Work {
         runtime.spawn(self.carried(posted, command));
     }
 
-    async fn carried(self, posted: Posted, command: Command) {
+    pub(super) async fn carried(self, posted: Posted, command: Command) {
         tokio::select! {
             () = self.work(posted) => {}
             () = self.tell_changes(&command) => {}
@@ -192,7 +213,7 @@ impl Work {
         }
     }
 
-    fn tell(&self, command: &Command) {
+    pub(super) fn tell(&self, command: &Command) {
         let view = Arc::new(self.view());
         let before = Arc::clone(&command.borrow());
         self.0.plant.0.tell_command(&view, Some(&before));

@@ -42,6 +42,9 @@ use drived_config::{config::Group, rights::Caller};
 pub const LIFETIME: Duration = Duration::from_secs(1);
 pub const LONGEST_LIFETIME: Duration = Duration::from_secs(10);
 
+/// Of more drives than these what is told of a stop is made when they have theirs.
+const MADE_AT_ONCE: usize = 100;
+
 /// What is asked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Request {
@@ -245,41 +248,59 @@ impl Plant {
         let mut passing = self.0.stopped.pass();
         // Before anything is made that is told of it: among thousands that takes longer than all their stops.
         let stops = meant.stop(&request);
-        match request.action {
-            Action::Stop(_) => {
-                passing.note(caller, meant.drives());
-                self.0.watched.stop(meant.drives());
-                drop(passing);
-                let work = Work::new(self.clone(), caller, &request, meant);
-                self.begin_new(work, caller, request, stops)
-            }
-            action => {
-                passing.may_begin(caller, &request, asked_after, meant.drives())?;
-                if matches!(action, Action::Start { .. }) {
-                    meant.drives().iter().for_each(|drive| self.0.watched.start_anew(drive.name()));
-                }
-                let work = Work::new(self.clone(), caller, &request, meant);
-                self.begin_new(work, caller, request, None)
-            }
+        if let Some(stops) = stops {
+            passing.note(caller, meant.drives());
+            self.0.watched.stop(meant.drives());
+            drop(passing);
+            return self.tell_stops(caller, request, meant, stops);
         }
-    }
-
-    /// Begins what is new; of a stop of several, which is under way.
-    fn begin_new(
-        &self,
-        work: Work,
-        caller: &Caller,
-        request: Request,
-        stops: Option<Posted>,
-    ) -> Result<Told, Rejected> {
+        passing.may_begin(caller, &request, asked_after, meant.drives())?;
+        if matches!(request.action, Action::Start { .. }) {
+            meant.drives().iter().for_each(|drive| self.0.watched.start_anew(drive.name()));
+        }
+        let work = Work::new(self.clone(), caller, &request, meant);
         match self.0.commands.find_or_add(caller, request, work.view())? {
             Found::Again(told) => Ok(told.subscribe()),
             Found::New(command) => {
                 let told = command.subscribe();
-                work.begin(command, stops);
+                work.begin(command, None);
                 Ok(told)
             }
         }
+    }
+
+    /// Tells of stops that are on their way.
+    fn tell_stops(
+        &self,
+        caller: &Caller,
+        request: Request,
+        meant: Meant,
+        stops: Posted,
+    ) -> Result<Told, Rejected> {
+        let asked = request.clone();
+        // Of so many even this waits until they have it: whoever asks at once is told how many they are.
+        let (first, work) = match meant.drives().len() > MADE_AT_ONCE {
+            true => (meant.pending(caller, &request), None),
+            false => {
+                let work = Work::new(self.clone(), caller, &request, meant.clone());
+                (work.view(), Some(work))
+            }
+        };
+        let (Found::New(command) | Found::Again(command)) =
+            self.0.commands.find_or_add(caller, asked, first)?;
+        let told = command.subscribe();
+        match work {
+            Some(work) => work.begin(command, Some(stops)),
+            None => {
+                let (plant, caller) = (self.clone(), caller.clone());
+                self.0.runtime.spawn(async move {
+                    let work = Work::new(plant, &caller, &request, meant);
+                    work.tell(&command);
+                    work.carried(stops, command).await;
+                });
+            }
+        }
+        Ok(told)
     }
 
     /// The drives that are meant.
@@ -460,6 +481,23 @@ mod tests {
         }
         drop(held);
         assert!(stopped.await.unwrap().is_ok());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn of_a_stop_of_very_many_it_is_told_how_many_before_who_they_are() {
+        let many = MADE_AT_ONCE + 1;
+        let plant = TestPlant::of(u8::try_from(many).unwrap()).await.plant;
+        let (caller, arrived) = (Caller::new("page", "page", Rights::ALL), Instant::now());
+        let action = Action::Stop(StopMode::Ramp.into());
+        let request = Request { id: None, target: Target::All, action, lifetime: LIFETIME, arrived };
+        let mut told = plant.begin(&caller, request).unwrap();
+        let counts = |view: &CommandView| {
+            let several = view.several.as_ref().unwrap();
+            (several.count(), several.drives.len())
+        };
+        assert_eq!(counts(&told.borrow()), (many, 0));
+        let last = told.wait_for(|view| view.outcome != OutcomeWord::Pending).await.unwrap();
+        assert_eq!((last.outcome, counts(&last)), (OutcomeWord::Confirmed, (many, many)));
     }
 
     #[tokio::test(start_paused = true)]
