@@ -1,14 +1,5 @@
 //! The [`Drive`] of this family.
 
-use async_trait::async_trait;
-use drive_core::{
-    Absent, BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Intent, Lease,
-    Measurements, Port, Recognised, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog,
-    WatchdogCapability, Withdrawn, Written, registers::refuse_commands,
-};
-use drive_drivecom as drivecom;
-use tokio_modbus::prelude::ReadCode;
-
 use crate::{
     Atv58,
     reading::Words,
@@ -16,6 +7,13 @@ use crate::{
     watchdog,
     words::FaultRegister,
 };
+use async_trait::async_trait;
+use drive_core::{
+    Absent, BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Intent, Lease,
+    Measurements, Port, Recognised, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog,
+    WatchdogCapability, Withdrawn, Written, registers::refuse_commands,
+};
+use drive_drivecom as drivecom;
 
 #[async_trait]
 impl<P: Port> Drive for Atv58<P> {
@@ -38,7 +36,7 @@ impl<P: Port> Drive for Atv58<P> {
 
     fn forget(&mut self) {
         self.proof.forget();
-        (self.absent, self.idle) = (Absent::default(), 0);
+        (self.absent, self.idle, self.said) = (Absent::default(), 0, None);
     }
 
     /// One exchange with the default map, and a second one for W483 when the drive has tripped. Of several fault bits
@@ -121,12 +119,16 @@ impl<P: Port> Drive for Atv58<P> {
     /// [`Error::Unsupported`] over Modbus, for which the manual names nothing of the kind and the card answers exception
     /// 01 (p. 22/46).
     async fn identify(&mut self) -> Result<Identity> {
-        match self.registers.at(Class::Background).identification(ReadCode::Basic).await {
+        match self.read_identity(Class::Background).await {
             Err(Error::Exception { code: 0x01, .. }) => Err(Error::Unsupported {
                 what: "identification",
                 reason: "the card says what it is over UNI-TELWAY only",
             }),
-            result => result,
+            result => {
+                let identity = result?;
+                self.said = Some(identity.clone());
+                Ok(identity)
+            }
         }
     }
 

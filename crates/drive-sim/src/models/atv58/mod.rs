@@ -95,6 +95,8 @@ pub struct Atv58 {
     /// Hundredths of a hertz in a count of the reference.
     count: i32,
     stop_bits: bool,
+    /// Its rating, as the card tells it over UNI-TELWAY.
+    name: &'static str,
 }
 
 impl Atv58 {
@@ -107,10 +109,22 @@ impl Atv58 {
         }
         let protocol = Protocol::default();
         let settings = settings(&bank, protocol, false, false);
-        let mut drive =
-            Self { unit: Unit::new(bank, NOMINAL_CURRENT, settings), protocol, count: 10, stop_bits: false };
+        let mut drive = Self {
+            unit: Unit::new(bank, NOMINAL_CURRENT, settings),
+            protocol,
+            count: 10,
+            stop_bits: false,
+            name: UNITE.name,
+        };
         drive.power(true);
         drive
+    }
+
+    /// The same drive with the rating that it tells over UNI-TELWAY.
+    #[must_use]
+    pub const fn identified_as(mut self, name: &'static str) -> Self {
+        self.name = name;
+        self
     }
 }
 
@@ -187,7 +201,7 @@ impl Family for Atv58 {
     }
 
     fn unite_words(&self) -> Option<UniTe> {
-        Some(UNITE)
+        Some(UniTe { name: self.name, ..UNITE })
     }
 }
 
@@ -216,6 +230,7 @@ fn settings(bank: &Bank, protocol: Protocol, runs_by_level: bool, stop_bits: boo
         low_speed: u32::from(bank.value(W251)) * 10,
         high_speed: u32::from(bank.value(W250)) * 10,
         low_speed_time: None,
+        brake_release: Duration::ZERO,
         restarts: None,
         link: LinkWatch { timeout: Some(watch), reaction: Reaction::Freewheel, code: LINK_FAULT },
     }

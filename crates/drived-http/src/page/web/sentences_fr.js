@@ -93,7 +93,7 @@ export const SENTENCES_FR = {
   'a stop came': 'un arrêt est arrivé',
   'the drive tripped': 'le variateur est passé en défaut',
   'the drive was lost': 'la liaison avec le variateur a été perdue',
-  'no answer yet': 'pas encore de réponse',
+  'nothing has confirmed it yet': 'rien ne l’a encore confirmé',
   'the drive has never been seen': 'le variateur n’a jamais été vu',
   'left as it is': 'laissé tel quel',
   'left turning, it was not started here': 'laissé en marche, il n’a pas été démarré ici',
