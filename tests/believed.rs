@@ -67,7 +67,8 @@ async fn a_setting_that_is_changed_at_the_keypad_of_a_motor_that_runs_is_told_un
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_g120_whose_full_scale_is_another_than_its_owner_says_is_told_at_another_frequency_than_was_asked() {
+async fn a_g120_whose_full_scale_is_another_than_its_owner_says_is_told_at_another_frequency_than_was_asked()
+{
     for (full_scale, is_told) in [(50, false), (40, true)] {
         let owner = Owner::default().with_full_scale(Frequency::from_hertz(full_scale));
         let (_fleet, pump, machine) = plant("g120", owner);

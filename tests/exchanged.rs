@@ -1,7 +1,7 @@
 //! A drive that is exchanged for another between two looks, within a time in which nobody misses it: it has the address and the
 //! wires of the one before, and says of itself what it is.
 
-use drive_bus::{Protocol, protocol::UniTelwaySettings};
+use drive_bus::Protocol;
 use drive_core::{Direction, Drive, Error, Frequency, Refusal, Setpoint};
 use drive_families::Family;
 use drive_sim::{Model, models};
@@ -20,7 +20,6 @@ const NCV_OF_A_312: u16 = 3_011;
 fn another(family: Family) -> Box<dyn Model> {
     match five(family) {
         Five::Atv21 => Box::new(models::atv21::Atv21::new().identified_as("ATV21HD30N4")),
-        Five::Atv58 => Box::new(models::atv58::Atv58::new().identified_as("ATV58U29N4")),
         Five::Atv312 => {
             Box::new(models::atv312::Atv312::under_bus_control().identified_as("ATV312HD15N4", "0102"))
         }
@@ -30,19 +29,11 @@ fn another(family: Family) -> Box<dyn Model> {
 
 #[tokio::test(start_paused = true)]
 async fn a_drive_that_was_exchanged_between_two_looks_is_not_started_by_the_others_name() {
-    // The card of a 58 tells which it is over UNI-TELWAY alone (VVDED397054 p. 11/35), so it is asked again where it was told.
-    let unitelway = Protocol::UniTelway(UniTelwaySettings::default());
-    let (rtu, either) = (Protocol::Rtu, &[true, false][..]);
-    for (family, protocol, identified) in [
-        (Family::ATV21, rtu, either),
-        (Family::ATV28, rtu, either),
-        (Family::ATV312, rtu, either),
-        (Family::ATV58, unitelway, &[true]),
-    ] {
-        for &identified in identified {
+    for family in [Family::ATV21, Family::ATV28, Family::ATV312] {
+        for identified in [true, false] {
             let settings = family.capabilities().factory;
             let open = |port, slave| drives::drive(family, port, slave);
-            let mut rig = Rig::new(protocol, settings, drives::machine(family), open);
+            let mut rig = Rig::new(Protocol::Rtu, settings, drives::machine(family), open);
             if identified {
                 rig.drive.identify().await.unwrap();
             }

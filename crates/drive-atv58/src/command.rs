@@ -127,13 +127,6 @@ impl<P: Port> Drivecom for Atv58<P> {
         if let Some(control) = status.control {
             return Ok(Some(Refusal::NotInControl(control)));
         }
-        // Over Modbus it says nothing of itself.
-        if self.said.is_some() {
-            let identity = self.read_identity(Class::Command).await?;
-            if let Some(reason) = identity.refuses_start(&mut self.said) {
-                return Ok(Some(reason));
-            }
-        }
         let negative = self.registers.at(Class::Command).read(W401).await?.cast_signed() < 0;
         let stays = negative && (setpoint.is_none() || self.is_negative().await?);
         Ok(stays.then_some(Refusal::Settings(

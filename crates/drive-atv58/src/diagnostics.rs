@@ -3,8 +3,8 @@
 
 use std::borrow::Cow;
 
-use drive_core::{Calls, Class, Error, Exchange, Identity, Port, PortError, Result};
-use tokio_modbus::{Request, Response, prelude::ReadCode};
+use drive_core::{Calls, Class, Error, Exchange, Port, PortError, Result};
+use tokio_modbus::{Request, Response};
 
 use crate::{Atv58, CAPABILITIES};
 
@@ -45,11 +45,6 @@ pub struct Counters {
 }
 
 impl<P: Port> Atv58<P> {
-    /// All that the card says of itself, over UNI-TELWAY: its rating and the version of its software.
-    pub(crate) async fn read_identity(&mut self, class: Class) -> Result<Identity> {
-        self.registers.at(class).identification(ReadCode::Basic).await
-    }
-
     /// Function 08/00: sends `data` round and checks that it comes back.
     ///
     /// # Errors

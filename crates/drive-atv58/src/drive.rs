@@ -1,12 +1,5 @@
 //! The [`Drive`] of this family.
 
-use crate::{
-    Atv58,
-    reading::Words,
-    registers::{CMD, W401, W402, W463, W483},
-    watchdog,
-    words::FaultRegister,
-};
 use async_trait::async_trait;
 use drive_core::{
     Absent, BroadcastWrite, Class, Direction, Drive, Error, Fault, Faults, Identity, Intent, Lease,
@@ -14,6 +7,15 @@ use drive_core::{
     WatchdogCapability, Withdrawn, Written, registers::refuse_commands,
 };
 use drive_drivecom as drivecom;
+use tokio_modbus::prelude::ReadCode;
+
+use crate::{
+    Atv58,
+    reading::Words,
+    registers::{CMD, W401, W402, W463, W483},
+    watchdog,
+    words::FaultRegister,
+};
 
 #[async_trait]
 impl<P: Port> Drive for Atv58<P> {
@@ -36,7 +38,7 @@ impl<P: Port> Drive for Atv58<P> {
 
     fn forget(&mut self) {
         self.proof.forget();
-        (self.absent, self.idle, self.said) = (Absent::default(), 0, None);
+        (self.absent, self.idle) = (Absent::default(), 0);
     }
 
     /// One exchange with the default map, and a second one for W483 when the drive has tripped. Of several fault bits
@@ -119,16 +121,12 @@ impl<P: Port> Drive for Atv58<P> {
     /// [`Error::Unsupported`] over Modbus, for which the manual names nothing of the kind and the card answers exception
     /// 01 (p. 22/46).
     async fn identify(&mut self) -> Result<Identity> {
-        match self.read_identity(Class::Background).await {
+        match self.registers.at(Class::Background).identification(ReadCode::Basic).await {
             Err(Error::Exception { code: 0x01, .. }) => Err(Error::Unsupported {
                 what: "identification",
                 reason: "the card says what it is over UNI-TELWAY only",
             }),
-            result => {
-                let identity = result?;
-                self.said = Some(identity.clone());
-                Ok(identity)
-            }
+            result => result,
         }
     }
 

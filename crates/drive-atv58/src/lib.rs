@@ -17,8 +17,8 @@ use std::time::Duration;
 use tokio::time::Instant;
 
 use drive_core::{
-    Absent, Capabilities, Class, Direction, ExceptionMeaning, Frequency, Identity, Port, Quantity, Registers,
-    Result, Row, SerialSettings, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
+    Absent, Capabilities, Class, Direction, ExceptionMeaning, Frequency, Port, Quantity, Registers, Result,
+    Row, SerialSettings, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 use drive_drivecom::Proof;
 
@@ -103,8 +103,6 @@ pub struct Atv58<P> {
     map: Atv58Map,
     /// Whether the ramp stop was the last word that was written.
     stops_by_ramp: bool,
-    /// What it has said of itself, as it does over UNI-TELWAY alone.
-    said: Option<Identity>,
 }
 
 impl<P: Port> Atv58<P> {
@@ -132,7 +130,6 @@ impl<P: Port> Atv58<P> {
             absent: Absent::default(),
             map,
             stops_by_ramp: false,
-            said: None,
         }
     }
 

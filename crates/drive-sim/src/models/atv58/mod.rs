@@ -95,8 +95,6 @@ pub struct Atv58 {
     /// Hundredths of a hertz in a count of the reference.
     count: i32,
     stop_bits: bool,
-    /// Its rating, as the card tells it over UNI-TELWAY.
-    name: &'static str,
 }
 
 impl Atv58 {
@@ -109,22 +107,10 @@ impl Atv58 {
         }
         let protocol = Protocol::default();
         let settings = settings(&bank, protocol, false, false);
-        let mut drive = Self {
-            unit: Unit::new(bank, NOMINAL_CURRENT, settings),
-            protocol,
-            count: 10,
-            stop_bits: false,
-            name: UNITE.name,
-        };
+        let mut drive =
+            Self { unit: Unit::new(bank, NOMINAL_CURRENT, settings), protocol, count: 10, stop_bits: false };
         drive.power(true);
         drive
-    }
-
-    /// The same drive with the rating that it tells over UNI-TELWAY.
-    #[must_use]
-    pub const fn identified_as(mut self, name: &'static str) -> Self {
-        self.name = name;
-        self
     }
 }
 
@@ -201,7 +187,7 @@ impl Family for Atv58 {
     }
 
     fn unite_words(&self) -> Option<UniTe> {
-        Some(UniTe { name: self.name, ..UNITE })
+        Some(UNITE)
     }
 }
 

@@ -103,7 +103,8 @@ async fn a_reload_that_waits_for_a_silent_drive_says_in_time_for_which_and_goes_
     let folder = drived_config::testing::Folder::new("silent");
     let file = folder.file("drives.toml");
     let controlled = |drives: &[(&str, u8, &str)]| format!("{}control = true\n", text(drives));
-    fs::write(&file, controlled(&[("south", 1, "other"), ("north", 1, "pump")])).unwrap();
+    fs::write(&file, controlled(&[("south", 1, "other"), ("north", 2, "beside"), ("north", 1, "pump")]))
+        .unwrap();
     let config = Config::load_to_begin(&file).unwrap();
     let sim = drive_sim::SimLine::default();
     let machine = sim.add(1, drive_sim::models::atv312::Atv312::under_bus_control()).unwrap();
@@ -119,7 +120,7 @@ async fn a_reload_that_waits_for_a_silent_drive_says_in_time_for_which_and_goes_
     let run = pump.run(drive_core::Direction::Forward, drive_core::Frequency::from_hertz(20)).await;
     assert!(run.is_confirmed(), "{run}");
     machine.mute();
-    fs::write(&file, text(&[("south", 1, "other")])).unwrap();
+    fs::write(&file, text(&[("south", 1, "other"), ("north", 2, "beside")])).unwrap();
     // The door closes after forty seconds.
     let told = tokio::time::timeout(Duration::from_secs(40), reloader.reload(false)).await;
     let Ok(Err(Failure::Drive(told))) = told else { panic!("{told:?}") };
