@@ -1,6 +1,8 @@
 //! Start, stop, reset: the control words of this drive, and how they are seen to act. The chart itself is
 //! [`drive_drivecom`].
 
+use std::time::Duration;
+
 use async_trait::async_trait;
 use drive_core::{
     Class, Command, Control, Direction, Effect, Error, OwnRun, Port, Recognised, Refusal, Result, Setpoint,
@@ -13,7 +15,7 @@ use crate::{
     Atv312,
     facts::OTHER_REFERENCE,
     reading::{FIRST, FastWords, raw_command},
-    registers::{CMD, ETA, IOLR, LFR, LFRD, LFT, RRS, TCC, TCT},
+    registers::{BLC, BRT, CMD, ETA, IOLR, LFR, LFRD, LFT, RRS, TCC, TCT},
     settings::{Controls, Known},
     words::{AccessLevel, ControlWord, ExtendedControl, StatusWord},
 };
@@ -280,6 +282,15 @@ impl<P: Port> Drivecom for Atv312<P> {
         let follows = self.follows_frequency(&words, controls.reference).await.ok()?
             || self.follows_speed().await.ok()?.1;
         other.or((!follows).then_some(OTHER_REFERENCE))
+    }
+
+    /// With brake control (bLC) the brake is released first, which takes brt, 5 s at the most (BBV51701 p. 47).
+    async fn turns_late(&mut self) -> Duration {
+        let mut calls = self.registers.at(Class::Command);
+        let (Ok(assigned), Ok(release)) = (calls.read(BLC).await, calls.read(BRT).await) else {
+            return Duration::ZERO;
+        };
+        if assigned == 0 { Duration::ZERO } else { Duration::from_millis(u64::from(release) * 10) }
     }
 
     /// What the inputs ask for counts only where the terminals command then. Keys and another bus do not tell what they ask for;

@@ -15,7 +15,7 @@ use crate::{
     intent::Intent,
     kept_readings::KeptReadings,
     lease::{Ground, Lease, Recognised},
-    refusal::SelfRestart,
+    refusal::{Refusal, SelfRestart},
     registers::{Row, Written},
     setpoint::{Direction, Setpoint, StopMode},
     status::{Measurements, Status},
@@ -139,6 +139,13 @@ pub trait Drive: Send {
     fn recognise(&self, identity: &Identity) -> Recognised {
         let _ = identity;
         Recognised::CannotTell
+    }
+
+    /// What has to be set up so in the drive for its words to mean what its family takes them for, and was found otherwise when it was last
+    /// read: with the drive's connect, each start and the [slow set](Self::measurements). A start is refused by it. `None`: nothing was
+    /// found. Nothing is sent.
+    fn unmet(&self) -> Option<Refusal> {
+        None
     }
 
     /// How long the motor coasts at the most when its output is cut, as its owner says; `None`: nobody knows, and a motor that

@@ -1,5 +1,7 @@
 //! Commands carried through the chart: write a step, read the status, go on from what it says.
 
+use std::time::Duration;
+
 use async_trait::async_trait;
 
 use super::{
@@ -85,6 +87,12 @@ pub trait Drivecom: Send {
     /// What keeps a run command that was given from being in force, where the drive tells it. May read more of the drive.
     async fn prevents_run(&mut self, status: &Status) -> Option<Refusal>;
 
+    /// How much longer than [`CONFIRMED_WITHIN`](drive_core::CONFIRMED_WITHIN) a motor may take to turn by a run command that the drive
+    /// holds, as its settings say: a brake that is released first. May read more of the drive.
+    async fn turns_late(&mut self) -> Duration {
+        Duration::ZERO
+    }
+
     /// Why the present fault is not to be reset: a run command of somebody else that the reset would let act. May read more
     /// of the drive.
     async fn refuses_reset(&mut self, status: &Status) -> Result<Option<Refusal>> {
@@ -147,7 +155,8 @@ fn chart_of(eta: u16, status: &Status) -> Option<ChartState> {
 /// # Errors
 /// [`Error::Refused`] before the run command is written: nothing starts then. [`Error::NotConfirmed`] when the drive trips
 /// after it, when somebody else has commanded the drive, or when the run command is not in force within
-/// [`CONFIRMED_WITHIN`](drive_core::CONFIRMED_WITHIN); one that was written stands in the drive then.
+/// [`CONFIRMED_WITHIN`](drive_core::CONFIRMED_WITHIN) and what its brake [takes](Drivecom::turns_late); one that was written stands in the
+/// drive then.
 pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) -> Result<Status> {
     const SOMEBODY: Refusal = Refusal::Overridden {
         by: "a command of somebody else, at the drive, its inputs or another master,",
@@ -161,7 +170,7 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
     let mut status = drive.read_status(Class::Command).await?;
     let mut climb = climb_from(drive, direction, None, &status).await?.map_err(refused)?;
     let mut confirming = Confirming::begin();
-    let mut given = false;
+    let (mut given, mut is_late) = (false, false);
     let mut shown = RunShown::NotYet;
     let because = loop {
         let waits = match chart_of(eta, &status).map(|state| climb.next(state)) {
@@ -209,7 +218,16 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
             if shown == RunShown::TurningRound {
                 return Ok(status);
             }
-            break drive.prevents_run(&status).await;
+            let because = drive.prevents_run(&status).await;
+            let more = if given && !is_late && because.is_none() {
+                drive.turns_late().await
+            } else {
+                Duration::ZERO
+            };
+            if more.is_zero() {
+                break because;
+            }
+            (is_late, confirming) = (true, Confirming::within(more));
         }
         let read = drive.read_status(Class::Command).await;
         // Once the run command was written, an exchange that fails says nothing of the motor.

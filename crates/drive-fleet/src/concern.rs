@@ -93,6 +93,9 @@ table! {
     /// It is none of the family that it is configured as.
     OtherFamily: "other_family", "a drive of another family answers at its address", Alarm, false,
         "set it up as what it is: until then it is only read, and stopped when that is asked for";
+    /// What has to be set up so in the drive for its words to mean what they are taken for is otherwise.
+    SetUpOtherwise: "set_up_otherwise", "a setting in it is not as it has to be, its motor may turn otherwise than is told", Alarm, false,
+        "set it at the drive as is said; until then it is not started";
     /// Its communication watchdog cannot be brought to what the contract says.
     WatchdogBroken: "watchdog_broken", "its watchdog is not as the contract says", Alarm, false,
         "set it at the drive, or change the contract";
@@ -117,6 +120,9 @@ table! {
     /// A measured value is above its limit.
     LimitExceeded: "limit_exceeded", "above its limit", Warning, false,
         "look at load, fan and filters, or at who gives a frequency above its limit";
+    /// It says that it is at its reference, and its output is not at its setpoint.
+    OffSetpoint: "off_setpoint", "the drive says that it is at its reference, and its output is not at its setpoint", Warning, false,
+        "see what 100 % is at the drive (its reference frequency), its lowest and highest speed, and who else gives it a setpoint";
     /// It shows an alarm that does not trip.
     Warning: "warning", "the drive shows an alarm", Warning, false,
         "read its faults: they name the alarm";

@@ -104,7 +104,8 @@ pub use settings::{
 };
 pub use shows::Shows;
 pub use snapshot::{
-    Counters, Freshness, IdentityCheck, Link, PendingStop, Snapshot, Timed, Trip, WatchdogCheck, has_reached,
+    Counters, Freshness, IdentityCheck, Link, OffSetpoint, PendingStop, Snapshot, Timed, Trip, WatchdogCheck,
+    has_reached,
 };
 pub use stop_order::StopOrder;
 pub use supervisor::checks::FEED_PART;

@@ -363,7 +363,7 @@ impl fmt::Display for Tenths {
 /// What is known of a command whose outcome is not.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unknown {
-    /// The last error; `None` while no answer has come yet.
+    /// The last error; `None` while its driver still looks for a sign of it.
     pub error: Option<Error>,
     /// What the drive said last, which is older than the command.
     pub last: Option<LastSeen>,
@@ -375,7 +375,8 @@ impl fmt::Display for Unknown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.error {
             Some(error) => error.fmt(f)?,
-            None => f.write_str("no answer yet")?,
+            // It may have answered all the while that its driver looks for a sign of it.
+            None => f.write_str("nothing has confirmed it yet")?,
         }
         match &self.last {
             Some(last) => write!(f, "; the drive was last seen {last}"),

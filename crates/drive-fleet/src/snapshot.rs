@@ -201,6 +201,27 @@ pub struct PendingStop {
     pub alarm: bool,
 }
 
+/// An output that is not at the setpoint which the drive says that it has reached.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OffSetpoint {
+    /// As this fleet gave it, and the drive confirmed it.
+    pub setpoint: Frequency,
+    /// As the drive tells it.
+    pub output: Frequency,
+}
+
+impl OffSetpoint {
+    /// By a status: further than what the compensation of slip makes of it.
+    pub(crate) fn of(setpoint: Option<Setpoint>, status: &Status) -> Option<Self> {
+        let says_so = status.motion == Motion::Driven && status.at_reference == Some(true);
+        let (Some(Setpoint::Frequency(setpoint)), Some(output)) = (setpoint, status.output_frequency) else {
+            return None;
+        };
+        let is_off = output.centihertz().abs_diff(setpoint.centihertz()) > NEAR_WITH_SLIP.centihertz();
+        (says_so && is_off).then_some(Self { setpoint, output })
+    }
+}
+
 /// A trip, with the statuses around it: the freeze-frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Trip {
@@ -317,6 +338,10 @@ pub struct Snapshot {
     pub run_command_stands: Option<Error>,
     /// The measured values that are above their limits.
     pub exceeded: Vec<Limit>,
+    /// What is set up otherwise in it than its words are taken for, as it was read last.
+    pub unmet: Option<Refusal>,
+    /// That its output is not at the setpoint that it says it is at.
+    pub off_setpoint: Option<OffSetpoint>,
     /// How often its EEPROM was written today, where that is more often than it lasts.
     pub eeprom_worn: Option<u32>,
     /// A stop that is not confirmed yet.

@@ -65,6 +65,7 @@ impl Task {
             // Also what a call that was dropped has left.
             let lease = drive.lease();
             desk.supervisor.handle_lease(lease);
+            desk.supervisor.handle_unmet(drive.unmet());
             // The record of an earlier run stays kept until the drive has said whether it is ours.
             let stop = desk.supervisor.stop_under_way();
             if lease.is_some() || !desk.supervisor.is_adopting() {

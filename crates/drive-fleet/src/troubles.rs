@@ -6,7 +6,7 @@ use tokio::time::Instant;
 use crate::{
     concern::{Concern, ConcernKind},
     outcome::Tenths,
-    snapshot::{Freshness, IdentityCheck, Link, Snapshot, Trip, WatchdogCheck},
+    snapshot::{Freshness, IdentityCheck, Link, OffSetpoint, Snapshot, Trip, WatchdogCheck},
 };
 
 impl Snapshot {
@@ -67,6 +67,11 @@ impl Snapshot {
                 IdentityCheck::OtherFamily { it_is, .. } => (None, Some(it_is.to_string())),
                 _ => return None,
             },
+            ConcernKind::SetUpOtherwise => {
+                // Of another drive that is told, and no setting.
+                let is_another = matches!(self.identity, IdentityCheck::OtherFamily { .. });
+                (None, Some(self.unmet.filter(|_| !is_another)?.to_string()))
+            }
             ConcernKind::WatchdogBroken => match &self.watchdog {
                 WatchdogCheck::Broken(why) => (None, Some(why.clone())),
                 _ => return None,
@@ -97,6 +102,10 @@ impl Snapshot {
             ConcernKind::LimitExceeded => {
                 let limits: Vec<String> = self.exceeded.iter().map(ToString::to_string).collect();
                 (None, (!limits.is_empty()).then(|| Some(limits.join(", ")))?)
+            }
+            ConcernKind::OffSetpoint => {
+                let OffSetpoint { setpoint, output } = self.off_setpoint?;
+                (None, Some(format!("output {output}, setpoint {setpoint}")))
             }
             ConcernKind::Warning => {
                 (None, status.filter(|status| status.value.warning == Some(true)).map(|_| None)?)
@@ -154,6 +163,7 @@ impl Snapshot {
                 // They are never asked for where they have no period.
                 Freshness::Never => self.measurements_max_age <= self.max_age,
             },
+            ConcernKind::OffSetpoint => self.setpoint.is_some() || status.is_undriven(),
             ConcernKind::Warning => status.warning.is_some(),
             _ => true,
         }

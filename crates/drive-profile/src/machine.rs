@@ -128,7 +128,7 @@ impl Machine {
         let held = file.place(register).and_then(|place| self.kept.get(&place)).copied().unwrap_or(0);
         // A drive whose setpoint is its run command turns round by its sign; the run command says so already.
         let counts = if register.signed { i64::from(held.cast_signed()).abs() } else { held.into() };
-        hertz(register).map_or(0, |[numerator, denominator]| hundredths(counts, numerator, denominator))
+        self.hertz(register).map_or(0, |[numerator, denominator]| hundredths(counts, numerator, denominator))
     }
 
     fn target(&self) -> i32 {
@@ -323,6 +323,28 @@ impl Machine {
         self.show_state(words, output)
     }
 
+    /// How many hertz are one count of a register, as a fraction.
+    fn hertz(&self, register: &Register) -> Option<[i64; 2]> {
+        let [numerator, denominator] = *register.scale.as_ref()?.get_ref();
+        match register.unit {
+            UnitName::Hertz => Some([numerator, denominator]),
+            UnitName::Percent => Some([numerator * self.full_scale(), denominator * 10_000]),
+            _ => None,
+        }
+    }
+
+    /// What 100 % is, in hundredths of a hertz: what somebody has set beside the line, where a register holds it.
+    fn full_scale(&self) -> i64 {
+        let file = self.profile.file();
+        let set = || {
+            let register = file.named(file.full_scale()?)?;
+            let held = self.kept.get(&file.place(register)?)?;
+            let [numerator, denominator] = *register.scale.as_ref()?.get_ref();
+            Some(hundredths((*held).into(), numerator, denominator))
+        };
+        set().unwrap_or_else(|| FULL_SCALE.centihertz().into())
+    }
+
     /// The registers that hold how fast it may turn.
     fn limits(&self) -> impl Iterator<Item = &str> {
         let setpoint = self.profile.file().setpoint.given().map(crate::format::Spanned::get_ref);
@@ -447,7 +469,7 @@ impl Machine {
         let Some(register) = self.profile.file().named(name) else { return };
         let scale = match register.unit {
             UnitName::Ampere => register.scale.as_ref().map(|scale| *scale.get_ref()),
-            _ => hertz(register),
+            _ => self.hertz(register),
         };
         let Some([numerator, denominator]) = scale else { return };
         let value = if register.signed { value } else { value.abs() };
@@ -528,16 +550,6 @@ fn named(profile: &Profile) -> Cells {
 fn alike(one: Written, other: Written) -> bool {
     let sign = |of: Written| of.value.cast_signed().signum();
     (one.space, one.address, sign(one)) == (other.space, other.address, sign(other)) && one.value != 0
-}
-
-/// How many hertz are one count of a register, as a fraction.
-fn hertz(register: &Register) -> Option<[i64; 2]> {
-    let [numerator, denominator] = *register.scale.as_ref()?.get_ref();
-    match register.unit {
-        UnitName::Hertz => Some([numerator, denominator]),
-        UnitName::Percent => Some([numerator * i64::from(FULL_SCALE.centihertz()), denominator * 10_000]),
-        _ => None,
-    }
 }
 
 impl Places for Machine {

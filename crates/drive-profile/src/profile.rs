@@ -152,6 +152,12 @@ impl File {
         self.register.get(name).map(Spanned::get_ref)
     }
 
+    /// The register that holds what 100 % of the setpoint is, where one does.
+    pub(crate) fn full_scale(&self) -> Option<&str> {
+        let full_scale = self.setpoint.given()?.get_ref().full_scale.as_ref()?.get_ref();
+        (full_scale != "owner").then_some(full_scale)
+    }
+
     /// What an action writes, in its order, register by register.
     pub(crate) fn writes(&self, action: &Action) -> Vec<Written> {
         action.steps.iter().flat_map(|step| self.written(step.get_ref(), None)).collect()

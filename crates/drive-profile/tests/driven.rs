@@ -381,7 +381,7 @@ async fn a_drive_that_its_profile_only_lets_stop_is_stopped_and_nothing_else() {
 
 #[tokio::test(start_paused = true)]
 async fn a_setpoint_beyond_what_is_known_is_refused_and_not_sent() {
-    for (key, option) in [("v20", "full-scale"), ("goodrive", "highest")] {
+    for (key, option) in [("g120", "full-scale"), ("goodrive", "highest")] {
         let family = family(key);
         let mut rig = contract(family, Options::default()).rig();
         let refused =

@@ -174,7 +174,7 @@ const MISTAKES: &[Mistake] = &[
     (
         "ESPHome: percent with what 100 % is baked into a factor",
         V20,
-        &[("full_scale = \"owner\"\n", "")],
+        &[("full_scale = \"REF_FREQ\"\n", "")],
         Refused("%"),
     ),
     (

@@ -127,7 +127,7 @@ fn a_setpoint_without_limits() {
 
 #[test]
 fn a_setpoint_of_which_nobody_says_what_is_all_of_it() {
-    refused(V20, "full_scale = \"owner\"\n", "", "of how much it counts percent");
+    refused(V20, "full_scale = \"REF_FREQ\"\n", "", "of how much it counts percent");
 }
 
 #[test]
@@ -619,7 +619,7 @@ fn what_scales_or_limits_a_setpoint_counts_with_its_source() {
     let memory = "[sources]\nmemory = { document = \"as remembered\", edition = \"unknown\", page = \"none\", mark = \"M\" }\n";
     let base = good(V20).replace("\n[state]\n", register).replace("[sources]\n", memory);
     assert_eq!(read(&base).expect("nothing rests on it").level(), Level::Motion);
-    held(&base.replace("full_scale = \"owner\"", "full_scale = \"TOP\""), "register TOP");
+    held(&base.replace("full_scale = \"REF_FREQ\"", "full_scale = \"TOP\""), "register TOP");
     let base = base.replace(
         "unit = \"Hz\"\nscale = [1, 100]\nsource = \"memory\"",
         "unit = \"%\"\nscale = [1, 100]\nsource = \"memory\"",
@@ -646,12 +646,12 @@ fn a_setpoint_beyond_any_speed() {
 fn states_from_which_no_start_acts_and_words_that_fit_none() {
     let ready = "    { state = \"ready\", bits = { register = \"STATE\", mask = 0xFFFF, value = 3, source = \"manuals\" } },\n";
     held(&damaged(GOODRIVE, ready, ""), "every start would be refused");
-    let not_ready = "    { state = \"not_ready\", bits = { register = \"ZSW\", mask = 0x0001, value = 0x0000, source = \"oi2012 wb\" } },\n";
+    let (alive, any) = ("mask = 0xA030, value = 0x0000, differs = true", "mask = 0x0001, value = 0x0000");
     let told = |text: &str| {
         let profile = read(text).unwrap_or_else(|refusals| panic!("{refusals}"));
         profile.gaps().iter().any(|gap| gap.what.starts_with("a status of 0000h fits no state"))
     };
-    assert!(!told(good(V20)) && told(&damaged(V20, not_ready, "")), "0 is what it shows without supply");
+    assert!(told(good(V20)) && !told(&damaged(V20, alive, any)), "0 is no word of a drive that is alive");
 }
 
 /// What is wrong first, and not what follows from it.

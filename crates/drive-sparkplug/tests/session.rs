@@ -222,7 +222,7 @@ fn a_metric_is_written_by_its_name_or_by_its_alias_alone() {
     let mut rig = alive();
     let by_name = written(rig.now, "Control/Setpoint", Raw::Double(40.0));
     let event = rig.hear(PUMP, &by_name, false);
-    let write = Write { name: "Control/Setpoint".to_owned(), value: Value::Double(40.0) };
+    let write = Write { name: "Control/Setpoint".to_owned(), value: Value::Double(40.0), timestamp: None };
     let expected = Command {
         device: Some(Id::new("pump 1").unwrap()),
         timestamp: Some(rig.now.unix_ms),
@@ -269,7 +269,7 @@ fn what_is_written_wrongly_is_told_with_its_reason() {
         (Metric { is_null: true, ..good.clone() }, WriteError::NotItsType(name())),
         (
             Metric { is_historical: true, ..good },
-            WriteError::Historical(Write { name: name(), value: Value::Double(40.0) }),
+            WriteError::Historical(Write { name: name(), value: Value::Double(40.0), timestamp: None }),
         ),
     ] {
         let payload = Payload { metrics: vec![metric], ..Payload::default() };

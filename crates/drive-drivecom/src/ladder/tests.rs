@@ -30,6 +30,8 @@ struct Chart {
     leases: Vec<Option<Lease>>,
     /// The control word that it holds, whatever is written.
     keeps: Option<u16>,
+    /// Behind a run command its motor turns from here on, and its settings say that it takes so much longer.
+    turns: Option<(tokio::time::Instant, Duration)>,
 }
 
 impl Chart {
@@ -49,6 +51,7 @@ impl Chart {
             own: OwnRun::new(),
             leases: Vec::new(),
             keeps: None,
+            turns: None,
         }
     }
 
@@ -131,12 +134,17 @@ impl Drivecom for Chart {
 
     async fn shows_run(&mut self, word: u16, _: &mut Status) -> Result<RunShown> {
         let stopping = self.stopped.is_some();
-        let in_force = self.written.last() == Some(&word) && !stopping;
+        let turns = self.turns.is_none_or(|(from, _)| from <= tokio::time::Instant::now());
+        let in_force = self.written.last() == Some(&word) && !stopping && turns;
         Ok(if in_force { RunShown::InForce } else { RunShown::NotYet })
     }
 
     async fn prevents_run(&mut self, _: &Status) -> Option<Refusal> {
         None
+    }
+
+    async fn turns_late(&mut self) -> Duration {
+        self.turns.map_or(Duration::ZERO, |(_, late)| late)
     }
 
     async fn read_control(&mut self) -> Result<u16> {
@@ -250,6 +258,22 @@ async fn a_drive_that_does_not_follow_is_not_confirmed() {
     let error = start(&mut drive, Direction::Forward, ENABLE_OPERATION).await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::NotConfirmed);
     assert_eq!(drive.written, [SHUTDOWN], "told once, and waited for");
+}
+
+/// A brake is released before the motor turns: 2.5 s here, beside the two in which every motor has to.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_turns_late_is_waited_for_as_long_as_its_settings_say_and_no_longer() {
+    for (turns_after, late, is_started) in
+        [(1_000, 0, true), (4_000, 0, false), (4_000, 2_500, true), (6_000, 2_500, false)]
+    {
+        let from = tokio::time::Instant::now() + Duration::from_millis(turns_after);
+        let mut drive = Chart { turns: Some((from, Duration::from_millis(late))), ..Chart::at(0x0023) };
+        let started = start(&mut drive, Direction::Forward, ENABLE_OPERATION).await;
+        let kind = started.err().map(|error| error.kind());
+        let wanted = (!is_started).then_some(ErrorKind::NotConfirmed);
+        assert_eq!(kind, wanted, "{turns_after} ms of {late} ms");
+        assert_eq!(drive.written, [ENABLE_OPERATION], "written once");
+    }
 }
 
 #[tokio::test(start_paused = true)]

@@ -58,7 +58,7 @@ use crate::{
     limits::Given,
     outcome::{Outcome, Refused, Unknown},
     settings::DriveSettings,
-    snapshot::{Counters, Link, Snapshot, Timed, Trip},
+    snapshot::{Counters, Link, OffSetpoint, Snapshot, Timed, Trip},
 };
 
 /// What was written last that changes the motor, and why.
@@ -167,6 +167,12 @@ pub(crate) struct Supervisor {
     /// Somebody else has command, and the settings leave the run command as it is until it is in force again.
     reported: bool,
     exceeded: BTreeMap<&'static str, Limit>,
+    /// What the family found to be set up otherwise.
+    unmet: Option<Refusal>,
+    /// Since when the drive says that it is at its reference, and is not at its setpoint.
+    off_since: Option<Instant>,
+    /// The same, once it lasts.
+    off_setpoint: Option<OffSetpoint>,
     /// Who has taken control, until it is back.
     control_taken: Option<Control>,
     /// The last job that was sent to change what the motor does, and why.
@@ -233,6 +239,9 @@ impl Supervisor {
             suspended: None,
             reported: false,
             exceeded: BTreeMap::new(),
+            unmet: None,
+            off_since: None,
+            off_setpoint: None,
             control_taken: None,
             acted: None,
             words: Arc::default(),
@@ -268,10 +277,7 @@ impl Supervisor {
         self.checks.reconfigure(now, settings);
         self.pace.reconfigure(now, settings.periods);
         self.settings = settings.clone();
-        if self.settings.limits.high.is_none() {
-            // What has no limit is above none.
-            self.exceeded.remove(observe::FREQUENCY);
-        }
+        self.check_limits();
         self.changed = true;
     }
 
@@ -532,6 +538,12 @@ impl Supervisor {
         self.lease = lease;
     }
 
+    /// What is set up otherwise in the drive than its words are taken for, as the family has read it.
+    pub(crate) fn handle_unmet(&mut self, unmet: Option<Refusal>) {
+        self.changed |= self.unmet != unmet;
+        self.unmet = unmet;
+    }
+
     /// What a contract with the drive rests on has changed without this side.
     pub(crate) fn handle_changed(&mut self, now: Instant, ground: Ground) {
         self.checks.changed(now, ground);
@@ -588,6 +600,8 @@ impl Supervisor {
             run_command_stands: self.withdrawal.as_ref().and_then(Withdrawal::stands).cloned(),
             eeprom_worn: self.ledger.is_worn(now),
             exceeded: self.exceeded.values().copied().collect(),
+            unmet: self.unmet,
+            off_setpoint: self.off_setpoint,
             since: self.since.clone(),
             stop: self.stopping.as_ref().map(Stopping::pending),
             lease: self.lease,

@@ -6,7 +6,10 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use drive_core::{Control, Error, ExceptionMeaning, Faults, Measurements, Motion, PortError, Result, Status};
+use drive_core::{
+    CONFIRMED_WITHIN, Control, Error, ExceptionMeaning, Faults, Measurements, Motion, PortError, Result,
+    Status,
+};
 use tokio::time::Instant;
 
 use super::{Acted, Asker, Job, Supervisor};
@@ -16,13 +19,11 @@ use crate::{
     exceeded::Limit,
     outcome::Refused,
     settings::{OnFault, OnLoss},
-    snapshot::{Link, Timed, Trip},
+    snapshot::{Link, OffSetpoint, Timed, Trip},
 };
 
 /// How many trips are kept for each drive.
 const TRIPS: usize = 16;
-/// By which an output above its limit is known among those that are exceeded.
-pub(super) const FREQUENCY: &str = "frequency";
 /// A silence in which a drive can have been switched off and on, or exchanged: what is checked at a connect is checked
 /// again.
 const SWITCHED_OFF: Duration = Duration::from_secs(1);
@@ -122,22 +123,8 @@ impl Supervisor {
                 },
             );
         }
-        self.check_limit("current", {
-            let limit = self.settings.alarms.current;
-            status
-                .value
-                .current
-                .zip(limit)
-                .map(|(measured, limit)| (Limit::Current { measured, limit }, measured > limit))
-        });
-        self.check_limit(FREQUENCY, {
-            let limit = self.settings.limits.high;
-            status
-                .value
-                .output_frequency
-                .zip(limit)
-                .map(|(measured, limit)| Limit::of_frequency(measured, limit))
-        });
+        self.check_limits();
+        self.judge_setpoint(now);
         if was == Link::Lost
             && self.settings.control
             && let OnLoss::Stop(mode) = self.settings.on_loss
@@ -311,30 +298,62 @@ impl Supervisor {
         self.pace.slow_ended(now);
         let result = self.judge_reference(now, result);
         let Ok(measurements) = result else { return };
-        let alarms = self.settings.alarms;
-        self.check_limit("drive thermal", {
-            measurements
-                .drive_thermal
-                .zip(alarms.drive_thermal)
-                .map(|(measured, limit)| (Limit::DriveThermal { measured, limit }, measured > limit))
-        });
-        self.check_limit("motor thermal", {
-            measurements
-                .motor_thermal
-                .zip(alarms.motor_thermal)
-                .map(|(measured, limit)| (Limit::MotorThermal { measured, limit }, measured > limit))
-        });
         self.retraction.measurements(now);
         self.measurements = Some(Timed::<Measurements>::new(measurements, now));
+        self.check_limits();
         self.changed = true;
     }
 
-    fn check_limit(&mut self, name: &'static str, measured: Option<(Limit, bool)>) {
-        let Some((limit, exceeded)) = measured else { return };
+    /// What was measured last against the limits as they are set now.
+    pub(super) fn check_limits(&mut self) {
+        let (high, alarms) = (self.settings.limits.high, self.settings.alarms);
+        let status = self.status.as_ref().map(|status| &*status.value);
+        let (current, output) =
+            (status.and_then(|status| status.current), status.and_then(|status| status.output_frequency));
+        let slow = self.measurements.as_ref().map(|measurements| &*measurements.value);
+        let (drive, motor) =
+            (slow.and_then(|slow| slow.drive_thermal), slow.and_then(|slow| slow.motor_thermal));
+        self.check_limit("current", current, alarms.current, |measured, limit| {
+            (Limit::Current { measured, limit }, measured > limit)
+        });
+        self.check_limit("frequency", output, high, Limit::of_frequency);
+        self.check_limit("drive thermal", drive, alarms.drive_thermal, |measured, limit| {
+            (Limit::DriveThermal { measured, limit }, measured > limit)
+        });
+        self.check_limit("motor thermal", motor, alarms.motor_thermal, |measured, limit| {
+            (Limit::MotorThermal { measured, limit }, measured > limit)
+        });
+    }
+
+    /// What has no limit is above none, and what was not measured is as it was.
+    fn check_limit<T>(
+        &mut self,
+        name: &'static str,
+        measured: Option<T>,
+        limit: Option<T>,
+        held: impl FnOnce(T, T) -> (Limit, bool),
+    ) {
+        let Some(limit) = limit else {
+            self.exceeded.remove(name);
+            return;
+        };
+        let Some((limit, exceeded)) = measured.map(|measured| held(measured, limit)) else { return };
         let was = if exceeded { self.exceeded.insert(name, limit) } else { self.exceeded.remove(name) };
         if was.is_some() != exceeded {
             self.emit(EventKind::Limit { limit, exceeded });
         }
+    }
+
+    /// Whether the motor is where the drive says that it is: what it counts its setpoint by may be another than it is taken for. A
+    /// setpoint that was just given may not be the one yet of which it says so.
+    fn judge_setpoint(&mut self, now: Instant) {
+        let off = self.status.as_ref().and_then(|status| {
+            let given = self.given.filter(|given| given.at < status.at)?;
+            OffSetpoint::of(Some(given.setpoint), &status.value)
+        });
+        let since = off.map(|_| self.off_since.unwrap_or(now));
+        let lasts = since.is_some_and(|since| now.saturating_duration_since(since) >= CONFIRMED_WITHIN);
+        (self.off_since, self.off_setpoint) = (since, off.filter(|_| lasts));
     }
 
     /// There is no valid status any more.
@@ -344,6 +363,7 @@ impl Supervisor {
         let silent_for = now.saturating_duration_since(self.silent_since);
         self.emit(EventKind::Lost { silent_for, error: self.last_error.clone() });
         self.given = None;
+        (self.off_since, self.off_setpoint) = (None, None);
         self.acted = None;
         self.explanations = 0;
         self.end_orders_by_loss();

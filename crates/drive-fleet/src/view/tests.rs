@@ -54,6 +54,8 @@ fn nothing_known() -> Snapshot {
         run_command_stands: None,
         eeprom_worn: None,
         exceeded: Vec::new(),
+        unmet: None,
+        off_setpoint: None,
         since: Vec::new(),
         stop: None,
         lease: None,

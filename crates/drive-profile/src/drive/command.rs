@@ -55,7 +55,7 @@ impl<P: Port> ProfileDrive<P> {
         }
         let (status, words) = self.read_status(Class::Command).await?;
         // Between two looks it may have been exchanged, or set up otherwise.
-        self.guarded.forget(&self.profile);
+        self.forget_guards();
         self.guard(order).await?;
         let local = self.commanded_by_other(&words);
         let was_fed = matches!(status.state, State::Running | State::Stopping);

@@ -24,7 +24,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
 
     fn forget(&mut self) {
         self.watch.lose_sight();
-        self.guarded.forget(&self.profile);
+        self.forget_guards();
         (self.comes_down, self.kept) = (None, None);
     }
 
@@ -34,6 +34,10 @@ impl<P: Port> Drive for ProfileDrive<P> {
             // Another maker's drive may read so too: it is likely, and no more.
             None => Recognised::CannotTell,
         }
+    }
+
+    fn unmet(&self) -> Option<Refusal> {
+        self.found_otherwise()
     }
 
     /// The words of its fingerprints, of a drive that has any of one value. Its guards are read in any case.
@@ -59,7 +63,12 @@ impl<P: Port> Drive for ProfileDrive<P> {
     }
 
     async fn measurements(&mut self) -> Result<Measurements> {
-        self.read_measurements().await
+        let measured = self.read_measurements().await?;
+        if self.is_guarded() {
+            // Somebody at the drive may set it up otherwise at any time; that it cannot be asked now says nothing.
+            self.read_guards(Class::Background).await.ok();
+        }
+        Ok(measured)
     }
 
     async fn faults(&mut self) -> Result<Faults> {

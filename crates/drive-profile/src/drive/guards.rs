@@ -2,7 +2,7 @@
 
 use drive_core::{Class, Command, Error, Identity, Port, RawWord, Refusal, Result, interned};
 
-use super::{ProfileDrive, Words};
+use super::{Owner, ProfileDrive, Words, sight::FullScale};
 use crate::{format::Guard, profile::Profile};
 
 /// What the guards of a drive were found to say.
@@ -23,14 +23,9 @@ pub(super) struct Guarded {
 
 impl Guarded {
     /// A drive without guards has nothing to show.
-    pub(super) fn of(profile: &Profile) -> Self {
-        let none = all(profile).next().is_none();
+    pub(super) fn of(profile: &Profile, owner: &Owner) -> Self {
+        let none = is_unguarded(profile, owner);
         Self { hold: none, have_held: none, otherwise: None, setting: None, started: false }
-    }
-
-    /// The line was lost: the drive may be another one.
-    pub(super) fn forget(&mut self, profile: &Profile) {
-        self.hold = all(profile).next().is_none();
     }
 }
 
@@ -38,6 +33,15 @@ fn all(profile: &Profile) -> impl Iterator<Item = &Guard> {
     let who = &profile.file().who;
     let lists = [&who.fingerprints, &who.guards].into_iter().filter_map(|list| list.given());
     lists.flatten().map(crate::format::Spanned::get_ref)
+}
+
+/// The register that holds what 100 % is, where its owner has said it as well: they have to be one.
+fn said_twice<'a>(profile: &'a Profile, owner: &Owner) -> Option<&'a str> {
+    profile.file().full_scale().filter(|_| owner.full_scale.is_some())
+}
+
+fn is_unguarded(profile: &Profile, owner: &Owner) -> bool {
+    all(profile).next().is_none() && said_twice(profile, owner).is_none()
 }
 
 /// What has to be set at the drive, with what was read.
@@ -101,37 +105,71 @@ impl<P: Port> ProfileDrive<P> {
         Ok(Identity { codes: constant.filter_map(code).collect(), ..Identity::default() })
     }
 
-    /// Reads the guards, unless they were read since the last reconnect.
+    /// Reads the guards, unless they were read since the last reconnect and held at the last look.
     pub(super) async fn see_guards(&mut self, class: Class) -> Result<()> {
-        if !self.guarded.hold {
+        if !self.guarded.hold || self.guarded.otherwise.is_some() {
             self.read_guards(class).await?;
         }
         Ok(())
     }
 
-    async fn read_guards(&mut self, class: Class) -> Result<Words> {
+    /// What was read of them proves nothing any more: the line was lost, and the drive may be another one, or set up otherwise.
+    pub(super) fn forget_guards(&mut self) {
+        self.guarded.hold = is_unguarded(&self.profile, &self.owner);
+    }
+
+    /// Whether there is anything to be watched.
+    pub(super) fn is_guarded(&self) -> bool {
+        !is_unguarded(&self.profile, &self.owner)
+    }
+
+    /// What was found otherwise at the last look, as a start would be refused for it.
+    pub(super) fn found_otherwise(&self) -> Option<Refusal> {
+        self.guarded.otherwise.map(|what| self.why_not(what))
+    }
+
+    pub(super) async fn read_guards(&mut self, class: Class) -> Result<Words> {
         let profile = self.profile.clone();
-        let names = all(&profile).map(|guard| guard.register.get_ref().as_str()).collect();
         let mut words = Words::default();
-        for block in profile.blocks(&names) {
+        for block in profile.guards() {
             let read = self.read_block(class, block).await?;
             words.keep(block, read);
         }
         let read = |guard: &Guard| profile.word(&words, guard.register.get_ref());
         let fails = |guard: &&Guard| read(guard).is_none_or(|word| !holds(guard, word));
-        self.guarded.otherwise =
-            all(&profile).find(fails).map(|guard| interned::text(&is_otherwise(guard, read(guard))));
+        let scale = self.scale_is_otherwise(&words);
+        let found = all(&profile).find(fails).map(|guard| interned::text(&is_otherwise(guard, read(guard))));
+        self.guarded.otherwise = found.or(scale);
         let guards = profile.file().who.guards.given().into_iter().flatten();
         let failing = all(&profile).filter(|guard| fails(guard)).count();
         let mut unset = guards.map(crate::format::Spanned::get_ref).filter(fails);
         // A fingerprint that fails is no setting that anybody can make.
         self.guarded.setting = (unset.clone().count() == failing)
-            .then(|| unset.find_map(|guard| Some(interned::text(&is_to_be_set(guard, read(guard)?)))))
+            .then(|| {
+                unset.find_map(|guard| Some(interned::text(&is_to_be_set(guard, read(guard)?)))).or(scale)
+            })
             .flatten();
         if self.guarded.otherwise.is_none() {
             (self.guarded.hold, self.guarded.have_held) = (true, true);
         }
         Ok(words)
+    }
+
+    /// That the drive holds another full scale than its owner has said.
+    fn scale_is_otherwise(&self, words: &Words) -> Option<&'static str> {
+        let (name, said) = said_twice(&self.profile, &self.owner).zip(self.owner.full_scale)?;
+        let held = match &self.sight.full_scale {
+            Some(FullScale::Register(cell)) => self.frequency(words, *cell),
+            _ => None,
+        };
+        let reads = match held {
+            Some(held) if held == said => return None,
+            Some(held) => format!("reads {held}"),
+            None => "was not read".to_owned(),
+        };
+        Some(interned::text(&format!(
+            "this does not hold: 100 % is {said}, as its owner says ({name} {reads}): set it at the drive, or say what it is by full-scale"
+        )))
     }
 
     /// Before anything but a stop is written.

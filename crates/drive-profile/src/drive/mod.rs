@@ -55,7 +55,7 @@ impl<P: Port> ProfileDrive<P> {
     pub fn new(port: P, slave: SlaveAddress, profile: Arc<Profile>, owner: Owner) -> Self {
         let registers = Registers::new(port, slave, profile.capabilities(), meaning);
         let sight = Arc::new(Sight::of(&profile));
-        let guarded = Guarded::of(&profile);
+        let guarded = Guarded::of(&profile, &owner);
         Self {
             registers,
             profile,

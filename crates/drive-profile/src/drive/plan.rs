@@ -6,7 +6,7 @@ use crate::format::Spanned;
 
 use super::cell::{Cell, Single};
 use crate::{
-    format::{Access, Answer, Bits, Register, Space},
+    format::{Access, Answer, Bits, Register, Space, UnitName},
     profile::Profile,
 };
 
@@ -140,11 +140,24 @@ impl Profile {
         if blocks.is_empty() { self.fast().into_iter().take(1).collect() } else { blocks }
     }
 
+    /// What reads the guards and fingerprints, and what 100 % is, which its owner may have said as well.
+    pub(crate) fn guards(&self) -> Vec<Block> {
+        let who = &self.file.who;
+        let all = [&who.fingerprints, &who.guards].into_iter().filter_map(Answer::given).flatten();
+        let names = all.map(|guard| name(&guard.get_ref().register));
+        self.blocks(&names.chain(self.file.full_scale()).collect())
+    }
+
     /// The exchanges that read these registers: those that stand in a row in one, where the drive lets them be read so.
     pub(crate) fn blocks(&self, names: &BTreeSet<&str>) -> Vec<Block> {
         let link = self.file.link.get_ref();
-        let decimals = names.iter().filter_map(|name| self.file.named(name)?.decimals_in.as_ref()).map(name);
-        let all = names.iter().copied().chain(decimals).filter_map(|name| self.place_of(name));
+        let registers = || names.iter().filter_map(|name| self.file.named(name));
+        let decimals = registers().filter_map(|register| register.decimals_in.as_ref()).map(name);
+        // Without what 100 % is a percentage is no frequency.
+        let is_share = registers().any(|register| register.unit == UnitName::Percent);
+        let full_scale = self.file.full_scale().filter(|_| is_share);
+        let all = names.iter().copied().chain(decimals).chain(full_scale);
+        let all = all.filter_map(|name| self.place_of(name));
         let mut singles: Vec<(Space, u16)> = Vec::new();
         // The second of two words, which stands for nothing without the first.
         let mut seconds: BTreeSet<(Space, u16)> = BTreeSet::new();

@@ -81,7 +81,8 @@ impl Profile {
                 .saturating_add(command_exchanges)
                 .saturating_mul(3)
                 .saturating_add(2),
-            measurement_exchanges: u8::try_from(slow.len()).unwrap_or(u8::MAX),
+            // With them the guards are looked at.
+            measurement_exchanges: u8::try_from(slow.len() + self.guards().len()).unwrap_or(u8::MAX),
             quantities: interned::list(&self.quantities()),
             ..least
         })

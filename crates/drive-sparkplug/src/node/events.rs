@@ -97,6 +97,8 @@ pub struct Write {
     pub name: String,
     /// The value.
     pub value: Value,
+    /// When it was so, by the host's clock, where the metric says it: it may be older than what carries it.
+    pub timestamp: Option<u64>,
 }
 
 /// Why a metric of a command is not written.

@@ -106,8 +106,10 @@ fn write(metrics: &Metrics, metric: &Metric) -> Result<Write, WriteError> {
     let name = definition.name.clone().into_owned();
     let raw = metric.value.as_ref().filter(|_| !metric.is_null);
     match metrics::read(definition, raw) {
-        Some(value) if metric.is_historical => Err(WriteError::Historical(Write { name, value })),
-        Some(value) => Ok(Write { name, value }),
+        Some(value) => {
+            let written = Write { name, value, timestamp: metric.timestamp };
+            if metric.is_historical { Err(WriteError::Historical(written)) } else { Ok(written) }
+        }
         None => Err(WriteError::NotItsType(name)),
     }
 }

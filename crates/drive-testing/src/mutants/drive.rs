@@ -5,7 +5,7 @@ use std::time::Duration;
 use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Capabilities, Direction, Drive, Error, Faults, Frequency, Ground, Identity, Intent,
-    KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, Reaction, Recognised, Result, Row,
+    KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, Reaction, Recognised, Refusal, Result, Row,
     SelfRestart, Setpoint, SlaveAddress, Status, StopMode, Stopped, Verdict, Watchdog, WatchdogCapability,
     Withdrawn, Written,
 };
@@ -121,6 +121,10 @@ impl Drive for Faulty {
 
     fn recognise(&self, identity: &Identity) -> Recognised {
         self.drive.recognise(identity)
+    }
+
+    fn unmet(&self) -> Option<Refusal> {
+        self.drive.unmet()
     }
 
     async fn status(&mut self) -> Result<Status> {

@@ -77,6 +77,9 @@ impl Commanding {
                 }
                 write => (write, None),
             };
+            // What was so before the host has sent it is as old as that.
+            let own = write.as_ref().ok().and_then(|write| write.timestamp);
+            let sent_unix_ms = timestamp.map(|sent| own.map_or(sent, |own| own.min(sent)));
             let of_the_past = of_the_past.map(|error| Refusal::malformed(error.to_string()));
             let unborn = (!is_alive).then_some(Refusal::NotBorn);
             let undated = || Refusal::malformed("its payload has no timestamp: its age is not known");
@@ -85,7 +88,7 @@ impl Commanding {
             let lost = || self.plant.names_problem().map(Refusal::NamesLost);
             let doubt = if is_retained { Some(Refusal::Retained) } else { unborn.or(undated).or_else(lost) };
             let Some(device) = device.as_ref().map(|device| device.as_str().to_owned()) else {
-                self.handle_alarms(write, of_the_past.or(doubt), timestamp, arrived);
+                self.handle_alarms(write, of_the_past.or(doubt), sent_unix_ms, arrived);
                 continue;
             };
             // The drive that it is now; of one that is gone the name may be another's by now.
@@ -100,7 +103,7 @@ impl Commanding {
                 target: Some(Target::Drive(drive)),
                 arrived: arrived.at,
                 asked_after: None,
-                sent_unix_ms: timestamp,
+                sent_unix_ms,
                 lifetime: self.lifetime,
                 longest: None,
                 id: None,
@@ -118,7 +121,7 @@ impl Commanding {
         sent_unix_ms: Option<u64>,
         arrived: &Arrived,
     ) {
-        let Ok(Write { name, value: Value::String(text) }) = write else {
+        let Ok(Write { name, value: Value::String(text), .. }) = write else {
             tracing::debug!("Sparkplug: {}: of the node only {ALARMS_COMMAND} can be written", arrived.topic);
             return;
         };
@@ -142,7 +145,7 @@ impl Commanding {
 /// What a write asks for.
 fn said(write: Result<Write, WriteError>) -> Said {
     let malformed = |why: String, body| Said::unclear(Unclear::Malformed(why), body);
-    let Write { name, value } = match write {
+    let Write { name, value, .. } = match write {
         Ok(write) => write,
         Err(error) => return malformed(error.to_string(), Json::from(error.to_string())),
     };

@@ -311,6 +311,30 @@ async fn a_stop_of_the_past_stops_and_a_start_of_the_past_starts_nothing() {
     }
 }
 
+/// A host may send a value that has waited with it, in a payload of now (Sparkplug 3.0, 6.4.6: each metric has a time of its own).
+#[tokio::test(start_paused = true)]
+async fn a_start_that_waited_with_its_host_is_late_and_a_stop_never_is() {
+    let bench = Bench::of(1, config("waited")).await;
+    let command = |text: &str, waited_ms: u64| {
+        let (name, value) = (Some("Control/Command".to_owned()), Some(Raw::String(text.to_owned())));
+        let timestamp = Some(now().unix_ms - waited_ms);
+        bench.write_metric("pump 1", Metric { name, value, timestamp, ..Metric::default() });
+    };
+    let start =
+        |id: &str| format!(r#"{{"id": "{id}", "action": "start", "setpoint": {{"frequency_hz": 20}}}}"#);
+    for (text, waited_ms, runs) in [
+        (start("a"), 60_000, false),
+        (start("b"), 0, true),
+        (r#"{"id": "c", "action": "stop"}"#.to_owned(), 60_000, false),
+    ] {
+        command(&text, waited_ms);
+        sleep(Duration::from_secs(20)).await;
+        let told = last(&bench);
+        assert_eq!(bench.plant.machines[0].observe().running, runs, "{text}: {told:?}");
+        assert_eq!(told[1] == "expired", waited_ms > 0 && text.contains("start"), "{told:?}");
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_stop_that_is_rejected_is_told_under_its_id() {
     let bench = Bench::of(1, SparkplugConfig { commands: Some(Role::View), ..config("view") }).await;

@@ -49,7 +49,7 @@ use drived_doors::{
 use drived_face::Surroundings;
 use drived_file::{Config, ledger};
 use drived_http::{
-    api::{self, Reload as _, setup::Setup as _},
+    api::{self, setup::Setup as _},
     metrics, page,
 };
 use drived_plant::{
@@ -293,7 +293,7 @@ fn table(plant: Plant) -> Option<Screen> {
 
 /// Reads the configuration again and says what became of it.
 async fn told(reloader: Reloader, audit: Audit) {
-    let reloaded = reloader.reload(false).await;
+    let reloaded = reloader.read_again(false).await;
     let text = match &reloaded {
         Ok(done) => done.join("; "),
         Err(failure) => failure.to_string(),

@@ -5,12 +5,16 @@ mod changes;
 use std::{
     path::PathBuf,
     sync::{Arc, PoisonError},
+    time::Duration,
 };
 
 use drive_bus::{Endpoint, Line};
 use drive_fleet::{DriveHandle, FleetError, Left, LineBudget};
 use drived_words::closing;
-use tokio::{sync::Mutex, time::Instant};
+use tokio::{
+    sync::Mutex,
+    time::{Instant, timeout},
+};
 
 use self::changes::{Change, changes};
 use super::{
@@ -31,6 +35,10 @@ use drived_plant::{
 };
 use drived_words::{drive_spec::DriveName, failure::Failure, json::unix};
 
+/// Whoever has asked for a reload hears within this time what it waits for: it goes on for as long as the exit may take (`shutdown`), and
+/// his door for no longer than forty seconds.
+const TOLD_WITHIN: Duration = Duration::from_secs(30);
+
 /// Reads the configuration again. Cheap to clone; one reload at a time.
 #[derive(Clone)]
 pub(super) struct Reloader(Arc<Inner>);
@@ -46,6 +54,8 @@ struct Inner {
     config: Mutex<Config>,
     /// Whether what was read last holds, and when what holds was read.
     last: std::sync::Mutex<(bool, u64)>,
+    /// The drives that are being taken out, each by its policy.
+    leaving: std::sync::Mutex<Vec<String>>,
     /// What is left of drives that were taken out.
     leavings: std::sync::Mutex<Leavings>,
     /// Where a scan asks: nobody opens a line there meanwhile.
@@ -81,6 +91,7 @@ impl Reloader {
             file,
             config: Mutex::new(config),
             last,
+            leaving: std::sync::Mutex::default(),
             leavings: std::sync::Mutex::default(),
             scanned: std::sync::Mutex::default(),
         }))
@@ -127,7 +138,9 @@ impl Reloader {
         let handle = |(name, place)| fleet.drive(name).map(|handle| (place, handle));
         let gone = places(config).filter(|(name, _)| leaving.contains(name)).filter_map(handle);
         let gone: Vec<_> = gone.collect();
+        self.leave(leaving.iter().map(ToString::to_string).collect());
         let actions = fleet.remove(&leaving, config.shutdown).await;
+        self.leave(Vec::new());
         // Whoever has to be heard goes with the motor that he has started and that was left turning.
         let gone: Vec<_> =
             gone.into_iter().map(|(place, handle)| Leaving::of(plant, place, &handle)).collect();
@@ -180,6 +193,44 @@ impl Reloader {
 }
 
 impl Reloader {
+    /// These are being taken out.
+    fn leave(&self, leaving: Vec<String>) {
+        *self.0.leaving.lock().unwrap_or_else(PoisonError::into_inner) = leaving;
+    }
+
+    /// What a reload that goes on waits for: each drive that is being taken out, with what troubles it.
+    fn waits_for(&self) -> String {
+        let (fleet, now) = (self.0.plant.fleet(), Instant::now());
+        let leaving = self.0.leaving.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let told = leaving.iter().filter_map(|name| {
+            let concern = fleet.drive(name)?.snapshot().concern(now);
+            Some(concern.map_or_else(|| name.clone(), |concern| format!("{name}: {concern}")))
+        });
+        let told: Vec<String> = told.collect();
+        let waits = if told.is_empty() { String::new() } else { format!(": {}", may_turn(&told)) };
+        format!("the configuration is being read again, and that goes on{waits}")
+    }
+
+    /// Reads the file and does what has changed in it, however long that takes.
+    pub(super) async fn read_again(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
+        let mut config = self.0.config.lock().await;
+        let file = self.0.file.clone();
+        // A name of a server may have to be looked up.
+        let read = blocking(move || Config::load_workable(&file)).await;
+        let mut read =
+            read.and_then(|new| no_new_doubt(&config, &new).and(still_own(&config, &new)).map(|()| new));
+        if let Ok(new) = &read
+            && let Err(scanned) = self.leaves_the_scan(&config, new).await
+        {
+            read = Err(scanned);
+        }
+        if dry_run {
+            let changes = changes(&config, &read?);
+            return Ok(changes.iter().map(|change| change.would_be(&self.0.plant.fleet())).collect());
+        }
+        self.take(&mut config, read).await
+    }
+
     /// What holds now, as far as the first hour asks.
     pub(super) async fn holds(&self) -> Here {
         Here::of(&self.0.file, &*self.0.config.lock().await)
@@ -316,28 +367,19 @@ impl Reload for Reloader {
     /// whole file is read and checked first.
     ///
     /// A drive whose settings or whose name alone have changed keeps its task, its snapshot and its motor. One that is removed, or whose
-    /// line, address, family or options have changed, ends by its policy, as at the exit.
+    /// line, address, family or options have changed, ends by its policy, as at the exit. What that waits for is told in time, and goes on.
     ///
     /// # Errors
     /// [`Failure::Input`] with what is wrong in the file; the old configuration holds then. [`Failure::Drive`] when a motor
     /// whose drive was removed may turn, and when only a part could be done: it says what holds then.
     async fn reload(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
-        let mut config = self.0.config.lock().await;
-        let file = self.0.file.clone();
-        // A name of a server may have to be looked up.
-        let read = blocking(move || Config::load_workable(&file)).await;
-        let mut read =
-            read.and_then(|new| no_new_doubt(&config, &new).and(still_own(&config, &new)).map(|()| new));
-        if let Ok(new) = &read
-            && let Err(scanned) = self.leaves_the_scan(&config, new).await
-        {
-            read = Err(scanned);
+        let this = self.clone();
+        let going = tokio::spawn(async move { this.read_again(dry_run).await });
+        match timeout(TOLD_WITHIN, going).await {
+            Ok(Ok(done)) => done,
+            Ok(Err(error)) => Err(Failure::Drive(error.to_string())),
+            Err(_) => Err(Failure::Drive(self.waits_for())),
         }
-        if dry_run {
-            let changes = changes(&config, &read?);
-            return Ok(changes.iter().map(|change| change.would_be(&self.0.plant.fleet())).collect());
-        }
-        self.take(&mut config, read).await
     }
 }
 

@@ -206,6 +206,8 @@ fn untroubled(now: Instant) -> Snapshot {
         run_command_stands: None,
         eeprom_worn: None,
         exceeded: Vec::new(),
+        unmet: None,
+        off_setpoint: None,
         stop: None,
         lease: None,
         suspended: None,

@@ -27,6 +27,8 @@ fn showing(state: State, motion: Motion, now: Instant) -> Snapshot {
         run_command_stands: None,
         eeprom_worn: None,
         exceeded: Vec::new(),
+        unmet: None,
+        off_setpoint: None,
         stop: None,
         lease: None,
         suspended: None,

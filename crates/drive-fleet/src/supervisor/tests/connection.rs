@@ -413,20 +413,82 @@ fn a_motor_that_gets_too_hot_is_told_and_told_when_it_is_back() {
 }
 
 #[test]
-fn a_motor_whose_limit_was_taken_away_is_above_none() {
-    let mut rig = Rig::ready();
-    rig.drive.run();
-    rig.drive.status.output_frequency = Some(Frequency::from_hertz(30));
-    let with = |high: Option<Frequency>, rig: &Rig| {
-        let mut settings = rig.machine.settings.clone();
-        settings.limits.high = high;
-        settings
-    };
-    for (high, above) in [(Some(Frequency::from_hertz(20)), true), (None, false)] {
-        let settings = with(high, &rig);
-        rig.machine.handle_settings(rig.now, &settings);
+fn what_is_above_a_limit_that_is_taken_away_or_raised_is_above_none_and_below_a_lowered_one_it_is_at_once() {
+    use drive_core::{Current, Percent};
+    type Set = fn(&mut crate::settings::DriveSettings, Option<u16>);
+    let limits: [(&str, Set); 4] = [
+        ("frequency", |settings, limit| settings.limits.high = limit.map(Frequency::from_hertz)),
+        ("current", |settings, limit| {
+            settings.alarms.current = limit.map(|limit| Current::from_deciamperes(limit.into()));
+        }),
+        ("drive thermal", |settings, limit| {
+            settings.alarms.drive_thermal = limit.map(|limit| Percent::from_percent(limit.cast_signed()));
+        }),
+        ("motor thermal", |settings, limit| {
+            settings.alarms.motor_thermal = limit.map(|limit| Percent::from_percent(limit.cast_signed()));
+        }),
+    ];
+    for (name, set) in limits {
+        let mut rig = Rig::ready();
+        rig.drive.run();
+        rig.drive.status.output_frequency = Some(Frequency::from_hertz(30));
+        rig.drive.status.current = Some(Current::from_deciamperes(30));
         rig.pass(1_500 * MS);
-        assert_eq!(!rig.snapshot().exceeded.is_empty(), above, "{high:?}");
+        let hot = Some(Percent::from_percent(30));
+        let measured = Measurements { drive_thermal: hot, motor_thermal: hot, ..Measurements::default() };
+        rig.machine.handle_reply(rig.now, Reply::Measurements(Ok(measured)));
+        for (limit, above) in [(Some(20), true), (Some(40), false), (Some(20), true), (None, false)] {
+            let mut settings = rig.machine.settings.clone();
+            set(&mut settings, limit);
+            rig.machine.handle_settings(rig.now, &settings);
+            assert_eq!(!rig.snapshot().exceeded.is_empty(), above, "{name} {limit:?}");
+        }
+    }
+}
+
+/// 100 % of a G120's setpoint is its p2000 (G120X p. 250), which nobody reads in hertz: at a p2000 of 60 Hz and a full scale of 50 Hz what is
+/// asked as 25 Hz is 30 Hz, and the drive says that it is there.
+#[test]
+fn a_drive_that_is_at_its_reference_and_not_at_its_setpoint_is_told_once_that_lasts() {
+    let off = |rig: &Rig| {
+        let concerns = rig.snapshot().concerns(rig.now);
+        let told = concerns.into_iter().find(|concern| concern.kind == ConcernKind::OffSetpoint);
+        told.map(|concern| concern.detail.unwrap_or_default())
+    };
+    let mut rig = Rig::ready();
+    let id = rig.order(run_at(25));
+    rig.pass(500 * MS);
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
+    for (hertz, at_reference, told) in [
+        (25, true, None),
+        // On its way it is told by nothing.
+        (30, false, None),
+        // The compensation of slip.
+        (27, true, None),
+        (30, true, Some("output 30.00 Hz, setpoint 25.00 Hz")),
+        (20, true, Some("output 20.00 Hz, setpoint 25.00 Hz")),
+        (25, true, None),
+    ] {
+        rig.drive.status.output_frequency = Some(Frequency::from_hertz(hertz));
+        rig.drive.status.at_reference = Some(at_reference);
+        rig.pass(1_000 * MS);
+        if hertz == 30 {
+            assert_eq!(off(&rig), None, "a setpoint may be on its way");
+        }
+        rig.pass(2_000 * MS);
+        assert_eq!(off(&rig).as_deref(), told, "{hertz} Hz, {at_reference}");
+    }
+}
+
+#[test]
+fn what_is_set_up_otherwise_in_a_drive_is_an_alarm_that_says_what_for_as_long_as_it_is_so() {
+    const OTHERWISE: Refusal = Refusal::Settings("A001 reads 1: set A001 to 3 at the drive");
+    let mut rig = Rig::ready();
+    for (unmet, told) in [(None, None), (Some(OTHERWISE), Some(OTHERWISE.to_string())), (None, None)] {
+        rig.machine.handle_unmet(unmet);
+        let concern = rig.snapshot().concern(rig.now);
+        assert!(concern.iter().all(|concern| concern.kind == ConcernKind::SetUpOtherwise), "{concern:?}");
+        assert_eq!(concern.and_then(|concern| concern.detail), told);
     }
 }
 

@@ -261,7 +261,10 @@ fn the_alarm_of_a_stop_over_a_cut_cable_says_what_is_not_known_and_how_old_the_l
     rig.collect();
     let Some(outcome) = rig.outcome(id) else { panic!("no outcome") };
     let said = outcome.to_string();
-    assert!(said.starts_with("outcome unknown: no answer yet; the drive was last seen running, "), "{said}");
+    assert!(
+        said.starts_with("outcome unknown: nothing has confirmed it yet; the drive was last seen running, "),
+        "{said}"
+    );
     assert!(said.ends_with(" s ago"), "{said}");
     let alarm = rig.outputs.iter().find_map(|output| match output {
         Output::Event(Happened { kind: kind @ EventKind::StopUnconfirmed { .. }, .. }) => {

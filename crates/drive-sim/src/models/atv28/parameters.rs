@@ -38,6 +38,7 @@ pub(super) fn settings(bank: &Bank, runs_by_level: bool) -> Settings {
         low_speed: u32::from(bank.value(LSP)) * 10,
         high_speed: u32::from(bank.value(HSP)) * 10,
         low_speed_time: Some(low_speed_time).filter(|time| !time.is_zero()),
+        brake_release: Duration::ZERO,
         restarts: None,
         // No document says that a silent line trips an Altivar 28.
         link: LinkWatch { timeout: None, reaction: Reaction::Ignore, code: LINK_FAULT },

@@ -51,6 +51,11 @@ pub(super) fn settings(routing: &Routing<'_>) -> Settings {
         low_speed: u32::from(bank.value(LSP)) * 10,
         high_speed: u32::from(bank.value(HSP).min(bank.value(TFR))) * 10,
         low_speed_time: Some(tenths(TLS)).filter(|time| !time.is_zero()),
+        brake_release: if bank.value(BLC) == 0 {
+            Duration::ZERO
+        } else {
+            Duration::from_millis(u64::from(bank.value(BRT)) * 10)
+        },
         restarts: restarts(bank),
         link: LinkWatch { timeout: Some(tenths(TTO)), reaction: reaction(bank.value(SLL)), code: super::SLF },
     }

@@ -216,6 +216,7 @@ fn settings(bank: &Bank, protocol: Protocol, runs_by_level: bool, stop_bits: boo
         low_speed: u32::from(bank.value(W251)) * 10,
         high_speed: u32::from(bank.value(W250)) * 10,
         low_speed_time: None,
+        brake_release: Duration::ZERO,
         restarts: None,
         link: LinkWatch { timeout: Some(watch), reaction: Reaction::Freewheel, code: LINK_FAULT },
     }

@@ -1,6 +1,6 @@
 //! What is asked of the motor, and how it is done.
 
-use super::{ChartState, Commander, Drivecom, Settings, Standstill, Stop};
+use super::{ChartState, Commander, Drivecom, Settings, Standstill, Stop, time::Brake};
 use crate::Ramp;
 
 /// What is asked of the motor.
@@ -92,9 +92,16 @@ impl Drivecom {
             Order::Stop(Stop::Fast) => commanded,
             _ if stops.fast => Order::Stop(Stop::Fast),
             _ if stops.injection => Order::Inject,
-            Order::Run if self.spent || self.timers.is_asleep => Order::Stop(self.settings.stop),
+            Order::Run if self.spent || self.timers.is_asleep || self.is_braked() => {
+                Order::Stop(self.settings.stop)
+            }
             _ => commanded,
         }
+    }
+
+    /// Whether a brake has to be released yet.
+    fn is_braked(&self) -> bool {
+        !self.settings.brake_release.is_zero() && self.timers.brake != Brake::Released
     }
 
     fn commanded(&self) -> Order {

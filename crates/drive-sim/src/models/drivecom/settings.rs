@@ -119,6 +119,8 @@ pub struct Settings {
     pub high_speed: u32,
     /// The time at low speed after which the motor is stopped until a greater reference comes (tLS).
     pub low_speed_time: Option<Duration>,
+    /// How long a brake takes to be released before the motor turns (brt, where bLC is assigned); zero: there is none.
+    pub brake_release: Duration,
     /// The automatic restart.
     pub restarts: Option<Restarts>,
     /// The communication watchdog.

@@ -26,6 +26,7 @@ const fn settings() -> Settings {
         low_speed: 0,
         high_speed: 5_000,
         low_speed_time: None,
+        brake_release: Duration::ZERO,
         restarts: None,
         link: LinkWatch { timeout: Some(Duration::from_secs(10)), reaction: Reaction::Freewheel, code: SLF },
     }

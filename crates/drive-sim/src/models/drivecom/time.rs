@@ -7,6 +7,18 @@ use super::{ChartState, Drivecom, LinkWatch, faults::Attempts, orders::Order};
 /// After this time the injection current is lowered (BBV51701 p. 40).
 const FULL_INJECTION: Duration = Duration::from_secs(5);
 
+/// Where the brake of a hoist is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Brake {
+    /// It holds.
+    #[default]
+    Engaged,
+    /// It is being released, for so long.
+    Releasing(Duration),
+    /// It lets the motor turn.
+    Released,
+}
+
 /// What is being waited for.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Timers {
@@ -20,6 +32,8 @@ pub(super) struct Timers {
     low_speed: Option<Duration>,
     /// Whether it was stopped for that, and waits for a greater reference.
     pub(super) is_asleep: bool,
+    /// The brake, of a drive that has one to release.
+    pub(super) brake: Brake,
     /// The automatic restart that is under way.
     pub(super) attempts: Option<Attempts>,
     /// Whether one was given up: nothing resets the fault before the supply was off.
@@ -58,6 +72,7 @@ impl Drivecom {
             self.watchdog.remaining(),
             timers.injection,
             timers.low_speed,
+            if let Brake::Releasing(left) = timers.brake { Some(left) } else { None },
             timers.attempts.map(|attempts| attempts.next),
             self.motor.until_change(),
         ];
@@ -74,6 +89,9 @@ impl Drivecom {
         }
         for waited in [&mut self.timers.injection, &mut self.timers.low_speed].into_iter().flatten() {
             *waited = waited.saturating_sub(time);
+        }
+        if let Brake::Releasing(left) = &mut self.timers.brake {
+            *left = left.saturating_sub(time);
         }
         if self.timers.injection == Some(Duration::ZERO) {
             self.timers.injection = None;
@@ -97,6 +115,23 @@ impl Drivecom {
         }
         self.hold_at_standstill();
         self.watch_low_speed();
+        self.watch_brake();
+    }
+
+    /// A run command releases the brake first, and the motor turns once it is (brt, BBV51701 p. 47).
+    fn watch_brake(&mut self) {
+        let (runs, turns) = (self.is_told_to_run(), self.motor.is_fed());
+        let next = match self.timers.brake {
+            _ if !runs && !turns => Brake::Engaged,
+            Brake::Engaged if runs && !turns => Brake::Releasing(self.settings.brake_release),
+            Brake::Engaged | Brake::Releasing(Duration::ZERO) => Brake::Released,
+            stays => stays,
+        };
+        let is_released = next == Brake::Released && self.timers.brake != next;
+        self.timers.brake = next;
+        if is_released {
+            self.obey();
+        }
     }
 
     /// After a time at low speed the motor is stopped; a greater reference runs it again, as long as the run command

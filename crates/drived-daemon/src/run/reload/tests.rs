@@ -82,7 +82,12 @@ fn begun(file: &std::path::Path) -> (Fleet, Reloader) {
     let config = Config::load_to_begin(file).unwrap();
     let lines: Vec<Line> =
         config.lines.iter().map(|part| Line::start(part.config.clone()).unwrap()).collect();
-    let fleet = super::super::build(&config, &lines, |_| Left::default()).start().unwrap();
+    begun_with(file, config, &lines)
+}
+
+/// The same on these lines.
+fn begun_with(file: &std::path::Path, config: Config, lines: &[Line]) -> (Fleet, Reloader) {
+    let fleet = super::super::build(&config, lines, |_| Left::default()).start().unwrap();
     let plant = Plant::start(fleet.clone(), Vec::new(), false);
     let around = Surroundings::new(plant.clone(), Audit::default(), Names::default());
     let faces = Faces::open(Vec::new(), around);
@@ -90,6 +95,40 @@ fn begun(file: &std::path::Path) -> (Fleet, Reloader) {
     let reloader =
         Reloader::new(plant, Notify::start(), Names::default(), faces, opened, file.to_owned(), config);
     (fleet, reloader)
+}
+
+/// A running drive is taken out of the file, and its cable is cut.
+#[tokio::test(start_paused = true)]
+async fn a_reload_that_waits_for_a_silent_drive_says_in_time_for_which_and_goes_on() {
+    let folder = drived_config::testing::Folder::new("silent");
+    let file = folder.file("drives.toml");
+    let controlled = |drives: &[(&str, u8, &str)]| format!("{}control = true\n", text(drives));
+    fs::write(&file, controlled(&[("south", 1, "other"), ("north", 2, "beside"), ("north", 1, "pump")]))
+        .unwrap();
+    let config = Config::load_to_begin(&file).unwrap();
+    let sim = drive_sim::SimLine::default();
+    let machine = sim.add(1, drive_sim::models::atv312::Atv312::under_bus_control()).unwrap();
+    let settings = drive_core::SerialSettings::MODBUS_DEFAULT;
+    let line = |part: &drived_config::config::LinePart| match &*part.name {
+        "north" => Line::over(sim.in_memory(), drive_bus::LineConfig::stream(settings)),
+        _ => Line::start(part.config.clone()).unwrap(),
+    };
+    let lines: Vec<Line> = config.lines.iter().map(line).collect();
+    let (fleet, reloader) = begun_with(&file, config, &lines);
+    let pump = fleet.drive("pump").unwrap();
+    pump.ready(Duration::from_secs(10)).await.unwrap();
+    let run = pump.run(drive_core::Direction::Forward, drive_core::Frequency::from_hertz(20)).await;
+    assert!(run.is_confirmed(), "{run}");
+    machine.mute();
+    fs::write(&file, text(&[("south", 1, "other"), ("north", 2, "beside")])).unwrap();
+    // The door closes after forty seconds.
+    let told = tokio::time::timeout(Duration::from_secs(40), reloader.reload(false)).await;
+    let Ok(Err(Failure::Drive(told))) = told else { panic!("{told:?}") };
+    assert!(told.contains("that goes on: THE MOTOR MAY TURN: pump: STOP NOT CONFIRMED"), "{told}");
+    assert!(fleet.drive("pump").is_some(), "its stop is under way");
+    machine.unmute();
+    tokio::time::sleep(Duration::from_secs(25)).await;
+    assert!(fleet.drive("pump").is_none() && !machine.observe().running, "{:?}", machine.observe());
 }
 
 /// The drives that were added, `two` of them by a guess and under control.

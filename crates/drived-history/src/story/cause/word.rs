@@ -34,11 +34,11 @@ pub(super) fn how_it_went(facts: &Facts, gone: &RecordView) -> Went {
     match (shown.reference_before_hz, shown.reference_hz) {
         // No drive is fed again, and answers, within a second.
         (Some(_), Some(0.0)) if shown.unread_ms.is_some_and(|apart| apart <= ONE_READING_MS) => {
-            let text = "its run command and its reference are both 0, and it had answered within a second before: another master that writes both leaves it so, or its supply was away for a moment; which of them is not known";
+            let text = "no run command stands in it, the reference that it shows is 0, and it had answered within a second before: another master that writes to it leaves it so, or its supply was away for a moment; which of them is not known";
             return Went::Open(Some(Sentence::of(NotKnown, text).at(at)));
         }
         (Some(_), Some(0.0)) => {
-            let text = "its supply was away: its run command and its reference are both 0 when a drive is fed again; another master that writes both as 0 leaves it so too";
+            let text = "its supply was away: no run command stands in a drive that is fed again, and the reference that it shows is 0; another master that writes to it leaves it so too";
             return Went::Unfed(Sentence::of(Likely, text).at(at));
         }
         (Some(before), Some(now)) if before == now => {

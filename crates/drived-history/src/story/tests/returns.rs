@@ -196,7 +196,7 @@ fn a_run_command_that_went_is_told_by_what_became_of_its_reference_and_not_by_th
         assert!(story.about.as_ref().unwrap().text.starts_with(headline), "{story:?}");
         let open = story.why(Certainty::NotKnown);
         assert_eq!(open.contains("away for less than two polls"), reference.is_none(), "{story:?}");
-        assert_eq!(open.contains("another master that writes both"), name == "both", "{story:?}");
+        assert_eq!(open.contains("the reference that it shows is 0"), name == "both", "{story:?}");
     }
 }
 
