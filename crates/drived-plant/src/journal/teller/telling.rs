@@ -21,6 +21,11 @@ impl Teller {
         after: Duration,
         said: String,
     ) {
+        // Its loss is told before its return.
+        let lost = (self.line_of(drive), Fate::Lost);
+        if self.together.get(&lost).is_some_and(|all| all.drives.iter().any(|(name, _)| name == drive)) {
+            self.tell_together(lost);
+        }
         let with_line = std::mem::take(&mut self.state(drive).with_line);
         if with_line || self.together.contains_key(&(self.line_of(drive), Fate::Back)) {
             self.share(now, drive, Fate::Back, level, after, said);
@@ -131,5 +136,31 @@ impl Teller {
         if self.repeats.admit(now, key, level, &text) {
             self.entries.push_back(Entry { level, text });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Behind a standstill of the program all are lost and back within a moment.
+    #[test]
+    fn a_loss_that_is_told_with_others_is_told_before_its_return() {
+        let (now, names) = (Instant::now(), ["pump 1", "pump 2"].map(Arc::<str>::from));
+        let mut teller = Teller::new(now);
+        teller.handle_members(now, "north", names.iter().cloned().zip(1..).collect());
+        teller.expect(now, &names[1], Fate::Lost);
+        let after = Duration::from_secs(12);
+        teller.share(now, &names[0], Fate::Lost, Level::ERROR, after, "at 20 Hz".to_owned());
+        teller.back(now, &names[0], Level::INFO, after, "running at 20 Hz".to_owned());
+        teller.handle_time(now + TOGETHER);
+        let told: Vec<String> = std::iter::from_fn(|| teller.poll_entry()).map(|entry| entry.text).collect();
+        assert_eq!(
+            told,
+            [
+                "north: also lost, no answer for up to 12 s: pump 1 at 20 Hz",
+                "north: pump 1 back after 12 s, running at 20 Hz"
+            ]
+        );
     }
 }
