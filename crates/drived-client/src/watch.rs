@@ -176,6 +176,7 @@ mod tests {
             id: None,
             target: Target::All,
             action: Action::Stop(drive_core::StopMode::Ramp.into()),
+            expects: None,
             lifetime: LIFETIME,
             arrived: Instant::now(),
         };

@@ -88,7 +88,7 @@ mod tests {
             until: Until::default(),
         };
         let target = Target::Drive("pump 1".to_owned());
-        let request = Request { id: None, target, action, lifetime, arrived };
+        let request = Request { id: None, target, action, expects: None, lifetime, arrived };
         let caller = Caller::new("operator", "page", Rights::ALL);
         let _ = test.plant.command(&caller, request, Duration::from_secs(10)).await;
         let drive = test.plant.fleet().drive("pump 1").unwrap();

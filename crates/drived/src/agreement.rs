@@ -141,6 +141,7 @@ async fn through_a_stop_that_is_not_confirmed_every_face_tells_the_same_at_every
     assert!(drive.start(Direction::Forward).await.is_confirmed());
     sleep(Duration::from_secs(20)).await;
     let stop = Asked {
+        expects: None,
         id: None,
         target: plant::commands::Target::All,
         action: Action::Stop(StopMode::Ramp.into()),

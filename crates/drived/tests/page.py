@@ -688,6 +688,90 @@ def somebody(page, url, token, other):
     expect(page.locator(".rows .row", has_text="pump 2")).to_contain_text("of 27.5 Hz · second")
 
 
+def as_shown(page, url, token, chief, config):
+    """A question is withdrawn when it is not as it was shown any more, and what it has shown is what is done, or nothing."""
+    page.goto(url)
+    log_in(page, token)
+    live(page)
+    dialog, said, latest = page.locator("dialog"), page.locator("#outcomes"), page.locator(".latest li")
+    start = page.get_by_role("button", name="Start forward")
+    group = page.get_by_label("Group", exact=True)
+
+    def ask(path, body, by=token):
+        answer = page.request.post(f"{url}api/v1/{path}", headers={"Authorization": f"Bearer {by}"}, data=body)
+        assert answer.ok, answer.text()
+
+    def give(hertz, name="pump 1"):
+        ask(f"drives/{name}/setpoint?wait=5s", {"setpoint": {"frequency_hz": hertz}})
+
+    def all_stand():
+        drives = page.request.get(f"{url}api/v1/drives").json()
+        assert [one["status"]["state"] for one in drives] == ["ready"] * 3, drives
+
+    give(20)
+    page.goto(f"{url}#/drive/pump 1")
+    setpoint = page.locator(".big > div", has=page.get_by_text("Setpoint", exact=True))
+    expect(setpoint).to_contain_text("20.0 Hz")
+    start.click()
+    expect(dialog).to_contain_text("pump 1: start forward at 20.0 Hz?")
+    give(45)
+    expect(said).to_contain_text("Start forward: question closed: the setpoint of pump 1 is 45.0 Hz now.")
+    expect(dialog).to_have_count(0)
+
+    # What the browser cannot know yet is judged where the drive is commanded.
+    def meanwhile(route):
+        give(30)
+        route.continue_()
+
+    page.route("**/api/v1/drives/*/start*", meanwhile, times=1)
+    start.click()
+    expect(dialog).to_contain_text("at 45.0 Hz?")
+    dialog.locator("button.primary").click()
+    expect(latest.first).to_contain_text("it is not as it was shown: the setpoint of pump 1 is 30.00 Hz now")
+    all_stand()
+
+    # The names of two drives are exchanged.
+    expect(setpoint).to_contain_text("30.0 Hz")
+    start.click()
+    expect(dialog).to_contain_text("at 30.0 Hz?")
+    with open(config, encoding="utf-8") as file:
+        text = file.read()
+    head, several = text.split("[[drives]]")
+    own = lambda slave, name: "[[drives]]" + several.replace("atv312@1-3", f"atv312@{slave}").replace("pump {}", f"pump {name}").split("[groups]")[0]
+    with open(config, "w", encoding="utf-8") as file:
+        file.write(head + own(1, 2) + own(2, 1) + own(3, 3) + "[groups]" + several.split("[groups]")[1])
+    ask("reload", {}, chief)
+    expect(said).to_contain_text("Start forward: question closed: the drive that was called pump 1 is called pump 2 now.")
+    expect(dialog).to_have_count(0)
+    expect(said).to_contain_text("pump 1 is the name of another drive now")
+
+    # A start by the question that stands is one, at what it has said.
+    live(page)
+    give(25)
+    expect(setpoint).to_contain_text("25.0 Hz")
+    start.click()
+    expect(dialog).to_contain_text("at 25.0 Hz?")
+    dialog.locator("button.primary").click()
+    expect(latest.first).to_contain_text("confirmed at")
+    page.locator(".orders").get_by_role("button", name="Stop", exact=True).click()
+    expect(latest.first).to_contain_text("confirmed at")
+    expect(page.locator(".drive-head .state b")).to_have_text("Ready")
+
+    # Those of a group are named with the setpoints at which they start.
+    page.goto(url)
+    live(page)
+    for name in ["pump 2", "pump 3"]:
+        give(20, name)
+    group.select_option(index=1)
+    expect(page.locator(".rows .row", has_text="pump 3")).to_contain_text("of 20.0 Hz")
+    page.get_by_role("button", name="Start group").click()
+    expect(dialog).to_contain_text("pump 3 (20.0 Hz)")
+    give(21, "pump 3")
+    expect(said).to_contain_text("Start group: question closed: the setpoint of pump 3 is 21.0 Hz now.")
+    expect(dialog).to_have_count(0)
+    all_stand()
+
+
 def zones(page, url):
     """Every time is the daemon's, in its zone and with it, whatever zone the browser is in."""
     page.goto(f"{url}#/events")
@@ -773,13 +857,13 @@ def several(page, url, token):
     page.get_by_label("Select all that are shown").check()
     page.locator(".selection").get_by_role("button", name="Start 3").click()
     dialog = page.locator("dialog")
-    expect(dialog).to_contain_text("These are: pump 1, pump 2, pump 3.")
+    expect(dialog).to_contain_text(re.compile(r"These are: pump 1 \([0-9.]+ Hz\), pump 2 \([0-9.]+ Hz\), pump 3 \([0-9.]+ Hz\)\."))
     # A no is no command.
     dialog.get_by_role("button", name="Cancel").click()
     assert not sent, sent
     page.get_by_label("Select pump 2").uncheck()
     page.locator(".selection").get_by_role("button", name="Start 2").click()
-    expect(dialog).to_contain_text("These are: pump 1, pump 3.")
+    expect(dialog).to_contain_text(re.compile(r"These are: pump 1 \([0-9.]+ Hz\), pump 3 \([0-9.]+ Hz\)\."))
     dialog.locator("button.primary").click()
     expect(page.locator(".several")).to_contain_text("pump 1, pump 3")
     path, body = sent[-1]

@@ -126,6 +126,11 @@ fn a_setpoint_of_somebody_else_is_said_and_his_name_stands_beside_it() {
 }
 
 #[test]
+fn a_question_is_withdrawn_when_it_is_not_as_it_was_shown_and_what_it_has_shown_is_what_is_done_or_nothing() {
+    look_at_three_pumps("as_shown");
+}
+
+#[test]
 fn every_time_is_the_daemons_with_its_zone() {
     look_at_three_pumps("zones");
 }
@@ -248,14 +253,16 @@ fn look_at_three_pumps(scene: &str) {
     };
     let text = if scene == "folded" { text.replace("atv312@1-3", "atv312@1-6") } else { text };
     let config = File::new(&format!("page-{scene}"), &text);
-    let token = |words: &[&str]| {
-        let add = ["token", "add", "--role", "operate", "--config", config.path()];
+    let token_of = |role, words: &[&str]| {
+        let add = ["token", "add", "--role", role, "--config", config.path()];
         run(&[&add, words].concat()).assert_done().trim().to_owned()
     };
+    let token = |words: &[&str]| token_of("operate", words);
     let tokens: &[String] = match scene {
         "trip" | "questions" | "axe" | "axe_dark" | "folded" | "alarms" | "touched" | "past" | "several" => {
             &[token(&["operator"])]
         }
+        "as_shown" => &[token(&["operator"]), token_of("engineer", &["chief"]), config.path().to_owned()],
         "scoped" | "somebody" => &[token(&["operator"]), token(&["second", "--drive", "pump 2"])],
         _ => &[],
     };

@@ -22,7 +22,7 @@ use drived_plant::{
     plant::{
         Plant,
         alarms::{AlarmDone, AlarmRejected},
-        commands::{ActionWord, OutcomeWord, Request, Target, Told},
+        commands::{ActionWord, Expects, OutcomeWord, Request, Target, Told},
     },
 };
 use drived_words::json::unix;
@@ -56,6 +56,11 @@ pub(super) struct Counter {
 impl Counter {
     pub(super) fn new(plant: Plant, audit: Audit) -> Self {
         Self { plant, audit, followed: Arc::new(Semaphore::new(FOLLOWED)), refused: Lately::default() }
+    }
+
+    /// Those that are meant now.
+    pub(super) fn as_it_is(&self, target: &Target) -> Option<Expects> {
+        self.plant.as_it_is(target)
     }
 
     /// Stops at once: no disk and no other command holds it up.

@@ -135,8 +135,15 @@ impl<A: Answers + Sync> Desk<A> {
                 return;
             }
             self.stopped.insert(key, arrived);
-            let request =
-                Request { id: named.id, target, action: Action::Stop(order), lifetime: LIFETIME, arrived };
+            let expects = message.said.expects();
+            let request = Request {
+                id: named.id,
+                target,
+                action: Action::Stop(order),
+                expects,
+                lifetime: LIFETIME,
+                arrived,
+            };
             return self.counter.stop(&caller, request, record, &answers);
         }
         self.stopped.clear();
@@ -184,6 +191,8 @@ impl<A: Answers + Sync> Desk<A> {
         // Its time has run since it was sent; and the same command is the same again, whenever it comes.
         let age = judge_time([message.sent_unix_ms, issued_unix_ms], message.arrived, request.lifetime)?;
         request.arrived = request.arrived.checked_sub(age).unwrap_or(request.arrived);
+        // While it waits for the audit log, the name may become another motor's.
+        request.expects = request.expects.or_else(|| self.counter.as_it_is(&request.target));
         if drive_fleet::mutant!("nameless-command-moves", message.needs_id, false) && request.id.is_none() {
             return Err(Refusal::IdNeeded);
         }

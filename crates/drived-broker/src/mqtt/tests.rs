@@ -334,7 +334,8 @@ async fn a_start_that_a_stop_by_another_door_may_have_overtaken_on_its_way_is_no
     let stop = || {
         let caller = Caller::new("operator", "page", Rights::ALL);
         let (target, action) = (Target::Drive("pump 1".to_owned()), Action::Stop(StopMode::Ramp.into()));
-        let request = Request { id: None, target, action, lifetime: LIFETIME, arrived: Instant::now() };
+        let request =
+            Request { id: None, target, action, expects: None, lifetime: LIFETIME, arrived: Instant::now() };
         bench.plant.plant.begin(&caller, request).unwrap();
     };
     for held in [1_000, 2_000] {

@@ -163,6 +163,7 @@ impl Desk {
             id: None,
             target: Target::Drive(drive.name().to_string()),
             action: Action::Stop(mode.into()),
+            expects: None,
             lifetime: LONGEST_LIFETIME,
             arrived,
         };
@@ -411,7 +412,7 @@ impl Desk {
         let left = || deadline.saturating_duration_since(Instant::now());
         let lifetime = deadline.saturating_duration_since(arrived).min(LONGEST_LIFETIME);
         let target = Target::Drive(drive.name().to_string());
-        let request = Request { id: None, target, action, lifetime, arrived };
+        let request = Request { id: None, target, action, expects: None, lifetime, arrived };
         let record = self.record(caller, drive, &request);
         record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
         match self.plant.command_asked_after(caller, request, asked_after, left()).await {

@@ -100,7 +100,7 @@ fn stop_of_all(arrived: Instant) -> (Caller, Request) {
     let caller = Caller::new("page", "page", Rights::ALL);
     let (target, action, lifetime) =
         (Target::All, Action::Stop(StopMode::Ramp.into()), Duration::from_secs(1));
-    (caller, Request { id: None, target, action, lifetime, arrived })
+    (caller, Request { id: None, target, action, expects: None, lifetime, arrived })
 }
 
 #[tokio::test(start_paused = true)]
@@ -359,7 +359,7 @@ async fn a_motor_that_somebody_else_starts_behind_a_stop_is_not_stopped_for_the_
     let action =
         Action::Start { direction: Direction::Forward, setpoint, until: drive_fleet::Until::default() };
     let (target, lifetime) = (Target::Drive("pump 1".to_owned()), Duration::from_secs(1));
-    let request = Request { id: None, target, action, lifetime, arrived: Instant::now() };
+    let request = Request { id: None, target, action, expects: None, lifetime, arrived: Instant::now() };
     let told = plant.plant.command(&caller, request, Duration::from_secs(3)).await.unwrap();
     assert!(plant.machines[0].observe().running, "{told:?}");
     sleep(Duration::from_secs(60)).await;

@@ -127,7 +127,8 @@ fn request(target: Target, body: impl Asks, arrived: Instant) -> Result<Request,
 
 fn stop(target: Target, said: Said, arrived: Instant) -> Request {
     let action = Action::Stop(said.stops().unwrap_or(StopMode::Ramp.into()));
-    Request { id: said.id, target, action, lifetime: LIFETIME, arrived }
+    let expects = said.expects();
+    Request { id: said.id, target, action, expects, lifetime: LIFETIME, arrived }
 }
 
 async fn carry_out(

@@ -21,6 +21,7 @@ use super::{
 };
 use drived_plant::plant::{
     Plant,
+    commands::{Expects, Rejected},
     parameters::{WrittenView, may_have_written},
 };
 use drived_words::registers::wanted;
@@ -39,6 +40,8 @@ pub(super) struct NewValue {
     /// Write only if a status that is read from now on shows standstill.
     #[serde(default)]
     only_at_standstill: bool,
+    /// What was shown of the drive: it is written so, or refused.
+    expects: Option<Expects>,
 }
 
 /// In its unit, as a hexadecimal word such as `0627h`, or the mnemonic of a listed value.
@@ -83,7 +86,7 @@ pub(super) async fn write(
     State(plant): State<Plant>,
     By(caller): By,
     path: Result<Path<(String, String)>, axum::extract::rejection::PathRejection>,
-    Sent(NewValue { value, save, only_at_standstill }): Sent<NewValue>,
+    Sent(NewValue { value, save, only_at_standstill, expects }): Sent<NewValue>,
 ) -> Result<Json<WrittenView>, Problem> {
     let Path((name, register)) = path?;
     if !caller.rights.engineer {
@@ -91,6 +94,10 @@ pub(super) async fn write(
     }
     if !plant.may_command(&caller, &name) {
         return Err(Problem::out_of_scope(&caller, &name));
+    }
+    if let Some(expects) = &expects {
+        let judged = plant.is_as_shown(expects, std::slice::from_ref(&name));
+        judged.map_err(|otherwise| Problem::rejected(&Rejected::Otherwise(otherwise), &caller))?;
     }
     let drive = find(&plant, &name)?.commanded_by(Act::of(&caller.name).through(&caller.origin));
     let row = row(&drive, &register)?;

@@ -83,6 +83,7 @@ files![
     "search.js",
     "selection.js",
     "several.js",
+    "shown.js",
     "sort.js",
     "stream.js",
     "texts.js",

@@ -84,7 +84,7 @@ mod tests {
         let caller = Caller::new("operator", "socket", Rights::ALL);
         let asked = |action| {
             let target = Target::Drive("pump 1".to_owned());
-            Request { id: None, target, action, lifetime: LIFETIME, arrived: Instant::now() }
+            Request { id: None, target, action, expects: None, lifetime: LIFETIME, arrived: Instant::now() }
         };
         let start = || {
             asked(Action::Start { direction: Direction::Forward, setpoint: None, until: Until::default() })

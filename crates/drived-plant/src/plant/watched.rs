@@ -357,7 +357,14 @@ impl Plant {
                 let action = Action::Stop(StopMode::Ramp.into());
                 record(&caller, format!("{name}: {}", action.text()));
                 let target = Target::Drive(name.to_string());
-                let request = Request { id: None, target, action, lifetime: LONGEST_LIFETIME, arrived: now };
+                let request = Request {
+                    id: None,
+                    target,
+                    action,
+                    expects: None,
+                    lifetime: LONGEST_LIFETIME,
+                    arrived: now,
+                };
                 // Nobody waits for it: the fleet repeats it until it is confirmed.
                 match self.begin(&caller, request) {
                     Ok(_) => self.0.watched.tell(name),

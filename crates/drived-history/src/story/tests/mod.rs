@@ -81,7 +81,8 @@ impl Night {
         };
         for drive in drives {
             let (lifetime, arrived) = (Duration::from_secs(1), Instant::now());
-            let request = Request { id: None, target: Target::Drive(drive), action, lifetime, arrived };
+            let request =
+                Request { id: None, target: Target::Drive(drive), action, expects: None, lifetime, arrived };
             let _ = self.plant.plant.command(&caller, request, Duration::from_secs(10)).await;
         }
     }

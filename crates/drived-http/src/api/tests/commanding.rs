@@ -15,7 +15,7 @@ use drived_doors::Scope;
 const RUN: &str = "/api/v1/drives/pump%201/start";
 const STOP: &str = "/api/v1/drives/pump%201/stop";
 
-fn is_running(plant: &TestPlant, number: usize) -> bool {
+pub(super) fn is_running(plant: &TestPlant, number: usize) -> bool {
     plant.machines[number].observe().running
 }
 

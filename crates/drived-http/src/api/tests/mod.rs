@@ -1,6 +1,7 @@
 //! The API over a simulated plant in virtual time, asked as a client asks it.
 
 mod alarms;
+mod as_shown;
 mod commanding;
 mod described;
 mod doors;

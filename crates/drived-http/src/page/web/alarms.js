@@ -151,12 +151,19 @@ function done(text, { by }, ms, note) {
   return note ? named(said, note) : said;
 }
 
+/** What of an alarm is not as a question has shown it: it is over, has come again, or is of a drive of another name. */
+function changedOf(alarm) {
+  const now = plant.alarms.get(alarm.id);
+  const isSame = now && now.count === alarm.count && ofWhat(now) === ofWhat(alarm);
+  return !isSame && t('now_alarm', { what: named(ofWhat(alarm), alarmText(alarm)) });
+}
+
 async function acknowledge(alarms) {
   const note = el('textarea', { maxlength: LONGEST_NOTE, rows: 3 });
   const listed = alarms.slice(0, NAMED).map(alarm => named(ofWhat(alarm), alarmText(alarm))).join(' · ');
   const question = alarms.length > NAMED ? t('and_more', { names: listed, count: alarms.length - NAMED }) : listed;
   const yes = alarms.length > 1 ? t('acknowledge_all', { count: alarms.length }) : t('acknowledge');
-  if (!await filled(question, yes, el('label.field', {}, t('alarm_note'), note))) return;
+  if (!await filled(() => alarms.map(changedOf).find(Boolean), question, yes, el('label.field', {}, t('alarm_note'), note))) return;
   // One after another: however many they are, the connections are left to a stop. What has come again meanwhile is not meant.
   for (const alarm of alarms) await send(alarm, 'acknowledge', { count: alarm.count, ...note.value.trim() ? { note: note.value.trim() } : {} });
 }
@@ -164,14 +171,14 @@ async function acknowledge(alarms) {
 async function shelve(alarm) {
   const time = el('select', {}, ...SHELVES_MIN.map(minutes => el('option', { value: minutes, selected: minutes === USUAL_SHELF_MIN }, duration(minutes * 60_000))));
   const why = el('textarea', { maxlength: LONGEST_NOTE, rows: 3, required: true });
-  if (!await filled(named(ofWhat(alarm), alarmText(alarm)), t('shelve'), el('label.field', {}, t('alarm_why'), why), el('label.field', {}, t('alarm_for'), time))) return;
+  if (!await filled(() => changedOf(alarm), named(ofWhat(alarm), alarmText(alarm)), t('shelve'), el('label.field', {}, t('alarm_why'), why), el('label.field', {}, t('alarm_for'), time))) return;
   await send(alarm, 'shelve', { minutes: Number(time.value), why: why.value.trim() });
 }
 
 /** What an alarm of maintenance asks for was done: it is counted from now on. */
 async function maintained(alarm) {
   const note = el('textarea', { maxlength: LONGEST_NOTE, rows: 3 });
-  if (!await filled(named(ofWhat(alarm), alarmText(alarm)), t('maintained_yes'), el('p', {}, t('maintained_about')), el('label.field', {}, t('alarm_note'), note))) return;
+  if (!await filled(() => changedOf(alarm), named(ofWhat(alarm), alarmText(alarm)), t('maintained_yes'), el('p', {}, t('maintained_about')), el('label.field', {}, t('alarm_note'), note))) return;
   await send(alarm, 'done', note.value.trim() ? { note: note.value.trim() } : {});
 }
 

@@ -1,15 +1,24 @@
 // A question of the page. Nothing behind it can be reached while it stands, but for the stop of all, which is above it.
 
 import { el } from './dom.js';
-import { daemonNow } from './plant.js';
+import { daemonNow, onChange, plant } from './plant.js';
+import { otherwise } from './shown.js';
 import { named, t } from './texts.js';
 
 /** What a question stands before. */
 const BEHIND = '.bar, main, .demo, .skip';
 const SHOWN_MS = 12_000;
 let standing = 0;
-/** The questions whose yes is a command: for which drives, since when, and how each is taken away. */
+/** The questions that stand: what each has shown, since when, of which daemon, and how it is taken away. */
 const questions = new Set();
+
+onChange(() => {
+  for (const one of [...questions]) {
+    const isAnew = plant.daemon.started_unix_ms !== one.started;
+    const why = isAnew ? t('now_daemon') : one.expects && otherwise(one.expects) || one.changed?.();
+    if (why) takeBack(one, t('withdrawn_by_change', { why }));
+  }
+});
 
 /** Puts a dialog with this form up: `close(value)` takes it away, Escape too; `closed` ends then, with the value. */
 export function ask(name, form) {
@@ -34,21 +43,25 @@ export function ask(name, form) {
 }
 
 /**
- * Asks whether these drives are commanded, perhaps with a field to be filled; `true` when the answer is `yes`. Escape, Cancel and a
- * stop meanwhile are a no.
+ * Asks whether the drives that are commanded are, perhaps with a field to be filled; `true` when the answer is `yes`. Escape, Cancel,
+ * a stop meanwhile, and that something is not as it was shown are a no: `expects` goes with the command; `changed()` says what else is.
  */
-export async function confirmed(drives, question, yes, field) {
-  const { close, closed } = put(question, yes, field);
-  const one = { drives, yes, close, since: daemonNow() };
+export function confirmed(expects, question, yes, { field, changed } = {}) {
+  return answered(expects, changed, question, yes, field);
+}
+
+/** Asks for what a form has; `true` when it was sent. No drive is commanded by it. */
+export function filled(changed, question, yes, ...fields) {
+  return answered(undefined, changed, question, yes, ...fields);
+}
+
+async function answered(expects, changed, question, yes, ...fields) {
+  const { close, closed } = put(question, yes, ...fields);
+  const one = { expects, changed, yes, close, since: daemonNow(), started: plant.daemon.started_unix_ms };
   questions.add(one);
   const answer = await closed;
   questions.delete(one);
   return answer === 'yes';
-}
-
-/** Asks for what a form has; `true` when it was sent. No drive is commanded by it. */
-export async function filled(question, yes, ...fields) {
-  return await put(question, yes, ...fields).closed === 'yes';
 }
 
 function put(question, yes, ...fields) {
@@ -66,12 +79,17 @@ function put(question, yes, ...fields) {
 export function withdraw(stop) {
   for (const one of [...questions]) {
     const stopped = [stop?.drive, ...(stop?.drives ?? []).map(each => each.drive)];
-    if (stop && (stop.time_unix_ms < one.since || !one.drives.some(drive => stopped.includes(drive)))) continue;
-    one.close('no');
-    const note = el('p.bad', {}, named(one.yes, t(stop ? 'withdrawn_by_stop' : 'withdrawn_by_stop_all')));
-    document.getElementById('outcomes').prepend(note);
-    setTimeout(() => note.remove(), SHOWN_MS);
+    if (!one.expects || stop && (stop.time_unix_ms < one.since || !one.expects.drives.some(({ name }) => stopped.includes(name)))) continue;
+    takeBack(one, t(stop ? 'withdrawn_by_stop' : 'withdrawn_by_stop_all'));
   }
+}
+
+function takeBack(one, why) {
+  questions.delete(one);
+  one.close('no');
+  const note = el('p.bad', {}, named(one.yes, why));
+  document.getElementById('outcomes').prepend(note);
+  setTimeout(() => note.remove(), SHOWN_MS);
 }
 
 function shut(isShut) {

@@ -85,7 +85,12 @@ export function drive(root, name) {
 
   function update(names) {
     if (!names.has('state') && !names.has(`drive ${name}`) && !names.has('event')) return;
-    shown = plant.drives.get(name) ?? shown;
+    const now = plant.drives.get(name);
+    if (now && now.place !== shown.place) {
+      say(named(name, t('now_another', { drive: name })));
+      return void dispatchEvent(new HashChangeEvent('hashchange'));
+    }
+    shown = now ?? shown;
     const status = shown.status ?? {};
     const { severity, text, remedy: first } = trouble(shown);
     setAttribute(head, 'data-state', severity === 'alarm' ? 'trouble' : status.state);
@@ -123,7 +128,11 @@ export function drive(root, name) {
     if (now === setpoint || !by || by.live === undefined) return;
     setpoint = now;
     if (by.caller === plant.daemon.caller || !by.live) return;
-    const note = el('p', {}, named(name, t('given_by_now', { who: by.caller, value: now })));
+    say(named(name, t('given_by_now', { who: by.caller, value: now })));
+  }
+
+  function say(text) {
+    const note = el('p', {}, text);
     document.getElementById('outcomes').prepend(note);
     setTimeout(() => note.remove(), SAID_MS);
   }

@@ -3,16 +3,17 @@
 import { path } from './api.js';
 import { confirmed } from './ask.js';
 import { el, setAttribute, setClass, setText } from './dom.js';
-import { quantity } from './format.js';
 import { askToken } from './login.js';
 import { command, isDone, onOrder, orderText, ordersOf } from './orders.js';
 import { mayCommand, plant } from './plant.js';
+import { isTripped } from './selection.js';
 import { setpointControl } from './setpoint.js';
+import { shown } from './shown.js';
 import { t } from './texts.js';
 import { told } from './told.js';
 import { faultText } from './trouble.js';
 import { word } from './vocabulary.js';
-import { setpointOf } from './words.js';
+import { setpointText } from './words.js';
 
 const STOPS = ['ramp', 'fast', 'freewheel', 'dc_injection'];
 const SHOWN = 6;
@@ -20,13 +21,15 @@ const SHOWN = 6;
 /** The panel of commands of the drive `name`: `element`, `update(drive)`, `end()`. */
 export function ordersPanel(name) {
   const button = (text, act, more = {}) => el('button', { type: 'button', onclick: act, ...more }, t(text));
+  // Whoever is called so later is not the one that this view is about.
+  const own = shown([name]);
   const setpoint = setpointControl(value => order('setpoint', { setpoint: { frequency_hz: value } }));
   const forward = button('start_forward', () => start('forward'));
   const reverse = button('start_reverse', () => start('reverse'));
   const mode = el('select', { 'aria-label': t('stop_mode') }, ...STOPS.map(kind => el('option', { value: kind }, word(kind))));
   const stop = button('stop', () => order('stop', { mode: mode.value }), { 'data-order': 'stop' });
   const reset = button('reset', askReset, { 'data-order': 'reset' });
-  const release = button('release', async () => await confirmed([name], t('confirm_release', { drive: name }), t('release')) && order('release'));
+  const release = button('release', async () => await confirmed(own, t('confirm_release', { drive: name }), t('release')) && order('release'));
   const moving = [setpoint.element, el('div.pair', {}, forward, reverse)];
   const stopping = el('div.pair', {}, stop, mode);
   const settling = el('div.pair', {}, reset, release);
@@ -41,7 +44,7 @@ export function ordersPanel(name) {
   return { element, update, end: forget };
 
   function update(drive) {
-    const tripped = drive.status?.state === 'fault' || Boolean(drive.fault);
+    const tripped = isTripped(drive);
     const readOnly = drive.control === false;
     // What somebody may not do is not offered to him.
     const may = mayCommand(drive);
@@ -59,18 +62,27 @@ export function ordersPanel(name) {
 
   async function start(direction) {
     const said = { drive: name, direction: t(`in_direction_${direction}`) };
-    const at = setpointOf(plant.drives.get(name) ?? {})?.frequency_hz;
-    const question = at === undefined ? t('confirm_start', said) : t('confirm_start_at', { ...said, setpoint: quantity(at, 1, 'Hz') });
-    if (await confirmed([name], question, t(`start_${direction}`))) order('start', { direction });
+    const expects = shown([name], true);
+    const at = expects.drives[0]?.setpoint;
+    const question = at ? t('confirm_start_at', { ...said, setpoint: setpointText(at) }) : t('confirm_start', said);
+    // What the drive follows by somebody else's word is his to give.
+    const given = plant.drives.get(name)?.setpoint;
+    if (await confirmed(expects, question, t(`start_${direction}`))) order('start', { direction, expects, ...given ? { setpoint: given } : {} });
   }
 
   async function askReset() {
     const fault = faultText(plant.drives.get(name));
-    if (await confirmed([name], t('confirm_reset', { drive: name, fault }), t('reset'))) order('reset');
+    const changed = () => {
+      const drive = plant.drives.get(name);
+      if (!isTripped(drive)) return t('now_no_fault', { drive: name });
+      const now = faultText(drive);
+      return now !== fault && t('now_fault', { drive: name, fault: now });
+    };
+    if (await confirmed(own, t('confirm_reset', { drive: name, fault }), t('reset'), { changed })) order('reset');
   }
 
   function order(action, body = {}) {
-    return command(name, action, path('drives', name, action), body);
+    return command(name, action, path('drives', name, action), { expects: own, ...body });
   }
 
   function writeLatest() {

@@ -7,6 +7,7 @@ import { readHistory } from './drive_faults.js';
 import { duration, MISSING, old, quantity } from './format.js';
 import { carryOut } from './orders.js';
 import { age, mayCommand, plant, quality } from './plant.js';
+import { shown } from './shown.js';
 import { bitName } from './status_bits.js';
 import { named, t } from './texts.js';
 import { told } from './told.js';
@@ -124,10 +125,11 @@ function parameterRow(name, row) {
   const field = el('input.small', { value: row.value ?? '', 'aria-label': row.mnemonic });
   const write = async event => {
     event.preventDefault();
-    if (!await confirmed([name], t('confirm_parameter', { drive: name, name: row.mnemonic, value: field.value }), t('set'))) return;
+    const expects = shown([name]);
+    if (!await confirmed(expects, t('confirm_parameter', { drive: name, name: row.mnemonic, value: field.value }), t('set'))) return;
     const number = Number(field.value.replace(',', '.'));
     const given = field.value.trim() === '' || Number.isNaN(number) ? field.value : number;
-    carryOut(name, 'parameter', () => post(path('drives', name, 'parameters', row.mnemonic), { value: given }, 'PUT'));
+    carryOut(name, 'parameter', () => post(path('drives', name, 'parameters', row.mnemonic), { value: given, expects }, 'PUT'));
   };
   value.replaceChildren(el('form.inline', { onsubmit: write }, field, row.unit ?? '', el('button', {}, t('set'))));
   return line;

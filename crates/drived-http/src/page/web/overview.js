@@ -10,8 +10,9 @@ import { here, keepAsked } from './place.js';
 import { mayCommand, plant, quality } from './plant.js';
 import { COLUMNS, makeRow } from './row.js';
 import { found } from './search.js';
-import { isTripped, mayChoose, selectionBar } from './selection.js';
+import { isTripped, listed, mayChoose, selectionBar } from './selection.js';
 import { severalPanel } from './several.js';
+import { shown as shownOf, shownToStop, withSetpoints } from './shown.js';
 import { isSortable, sorted } from './sort.js';
 import { named, t } from './texts.js';
 import { makeTile } from './tile.js';
@@ -231,22 +232,18 @@ export function overview(root, _, isBack) {
     group.hidden = plant.groups.length === 0;
   }
 
-  /** A stop is sent whatever this page knows of the group; anything else to the drives that the question was about, or it is asked anew. */
+  /** A stop is sent whatever this page knows of the group; anything else to the drives that the question was about. */
   async function orderGroup(action) {
     const name = asked.group;
-    const members = () => plant.groups.find(one => one.name === name)?.drives;
-    let those = members();
-    let note = '';
-    while (action !== 'stop') {
-      if (!those) return;
-      const question = t(`confirm_${action}_group`, { count: those.length, group: name });
-      if (!await confirmed(those, `${note}${question}`, t(`${action}_group`))) return;
-      const now = members();
-      if (now && String([...now].sort()) === String([...those].sort())) break;
-      note = `${t('group_changed')} `;
-      those = now;
-    }
-    command(name, action, path('groups', name, action));
+    const members = () => plant.groups.find(one => one.name === name)?.drives ?? [];
+    const those = members();
+    const give = body => command(name, action, path('groups', name, action), body);
+    if (action === 'stop') return void give(shownToStop(those));
+    const expects = shownOf(those, action === 'start');
+    const question = t(`confirm_${action}_group`, { count: those.length, group: name });
+    const these = t('these_are', { names: listed(action === 'start' ? withSetpoints(expects) : those) });
+    const changed = () => String([...members()].sort()) !== String([...those].sort()) && t('group_changed');
+    if (await confirmed(expects, `${question} ${these}`, t(`${action}_group`), { changed })) give({ expects });
   }
 }
 

@@ -5,6 +5,7 @@ import { el, setText } from './dom.js';
 import { quantity } from './format.js';
 import { command } from './orders.js';
 import { mayCommand, plant } from './plant.js';
+import { shown as shownOf, shownToStop, withSetpoints } from './shown.js';
 import { t } from './texts.js';
 
 const NAMED = 12;
@@ -33,7 +34,7 @@ export function selectionBar(chosen, changed) {
   const count = el('b', { role: 'status' });
   const button = (action, act) => el('button', { type: 'button', 'data-order': action, onclick: act });
   const buttons = {
-    start: button('start', askStart), stop: button('stop', () => give('stop')),
+    start: button('start', askStart), stop: button('stop', askNothing),
     setpoint: button('setpoint', askSetpoint), reset: button('reset', askReset),
   };
   const none = el('button.quiet', { type: 'button', onclick: clear }, t('select_none'));
@@ -64,39 +65,49 @@ export function selectionBar(chosen, changed) {
     return [...chosen].filter(name => plant.drives.has(name) && FITS[action](plant.drives.get(name)));
   }
 
-  function give(action, body = {}, names = fitting(action)) {
+  function give(action, names, body) {
     command(t('selected', { count: names.length }), action, `selected/${action}`, { drives: names, ...body });
+  }
+
+  function askNothing() {
+    const names = fitting('stop');
+    give('stop', names, shownToStop(names));
   }
 
   async function askStart() {
     const names = fitting('start');
-    if (await confirmed(names, question('confirm_start_these', names), t('start_these', { count: names.length }))) give('start', { direction: 'forward' }, names);
+    const expects = shownOf(names, true);
+    const asked = question('confirm_start_these', names, withSetpoints(expects));
+    if (await confirmed(expects, asked, t('start_these', { count: names.length }))) give('start', names, { direction: 'forward', expects });
   }
 
   async function askReset() {
     const names = fitting('reset');
-    if (await confirmed(names, question('confirm_reset_these', names), t('reset_these', { count: names.length }))) give('reset', {}, names);
+    const expects = shownOf(names);
+    if (await confirmed(expects, question('confirm_reset_these', names), t('reset_these', { count: names.length }))) give('reset', names, { expects });
   }
 
   async function askSetpoint() {
     const all = fitting('setpoint');
+    const expects = shownOf(all);
     const [low, high] = limitsOf(all);
     const field = el('input', { type: 'number', step: STEP_HZ, min: low, max: high, required: true, inputmode: 'decimal' });
     const said = t('limits_are', { low: quantity(low, 1), high: quantity(high, 1, 'Hz') });
     const label = el('label.field', {}, `${t('setpoint')} (Hz). ${said}`, field);
-    if (!await confirmed(all, question('confirm_setpoint_these', all), t('set'), label)) return;
-    give('setpoint', { setpoint: { frequency_hz: Number(field.value) } }, all);
+    if (!await confirmed(expects, question('confirm_setpoint_these', all), t('set'), { field: label })) return;
+    give('setpoint', all, { setpoint: { frequency_hz: Number(field.value) }, expects });
   }
 
   /** Who is commanded, and who of the chosen is not. */
-  function question(text, names) {
+  function question(text, names, told = names) {
     const out = [...chosen].filter(name => !names.includes(name));
-    return [t(text, { count: names.length }), t('these_are', { names: listed(names) }), out.length && t('left_out', { names: listed(out) })]
+    return [t(text, { count: names.length }), t('these_are', { names: listed(told) }), out.length && t('left_out', { names: listed(out) })]
       .filter(Boolean).join(' ');
   }
 }
 
-function listed(names) {
+/** The first of many. */
+export function listed(names) {
   const first = names.slice(0, NAMED).join(', ');
   return names.length > NAMED ? t('and_more', { names: first, count: names.length - NAMED }) : first;
 }

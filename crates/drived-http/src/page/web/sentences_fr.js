@@ -294,6 +294,15 @@ export function useWords(word) {
 
 // Longer patterns stand before those that would take a part of them.
 const PATTERNS = [
+  [/^it is not as it was shown: (.+)$/, why => `ce n’est plus comme affiché : ${french(why)}`],
+  [/^the drive that was called (.+) is called (.+) now$/, (was, now) => `le variateur qui s’appelait ${was} s’appelle ${now} à présent`],
+  [/^the drive that was called (.+) is there no more$/, name => `le variateur qui s’appelait ${name} n’est plus là`],
+  [/^(.+) is the name of another drive now$/, name => `${name} est à présent le nom d’un autre variateur`],
+  [/^(.+) has come to those that are meant$/, name => `${name} s’est ajouté à ceux qui sont visés`],
+  [/^(.+) is none of those that are meant any more$/, name => `${name} n’est plus de ceux qui sont visés`],
+  [/^the setpoint of (.+) is (\S+ \S+) now$/, (name, setpoint) => `la consigne de ${name} est ${number(setpoint)} à présent`],
+  [/^the setpoint of (.+) is not known any more$/, name => `la consigne de ${name} n’est plus connue`],
+  [/^another setpoint is on its way to (.+): (\S+ \S+)$/, (name, setpoint) => `une autre consigne est en route vers ${name} : ${number(setpoint)}`],
   [/^this is the port of line "(.+)", whose drives are asked there already: a scan would disturb them$/, line => `ce port est celui de la ligne « ${line} », dont les variateurs y sont déjà interrogés : une recherche les gênerait`],
   [/^another scan is under way: give it up first$/, () => 'une autre recherche est en cours : abandonnez-la d’abord'],
   [/^the port of line "(.+)" is being scanned: wait for it, or give the scan up$/, line => `le port de la ligne « ${line} » est en cours de recherche : attendez-en la fin, ou abandonnez-la`],

@@ -5,6 +5,7 @@ import { el, setAttribute, setText } from './dom.js';
 import { old, MISSING } from './format.js';
 import { ofDrive } from './place.js';
 import { age, plant, quality } from './plant.js';
+import { shown as shownOf } from './shown.js';
 import { t } from './texts.js';
 import { langOf, told } from './told.js';
 import { trouble } from './trouble.js';
@@ -87,7 +88,7 @@ export function addedPanel(change) {
       const doubts = to ? [guessed && el('p.remark', {}, t('setup_confirm_guess', { family: guessed, file })),
         ...(unseen.length ? [el('p', {}, t('not_known_of')), el('ul.history', {}, ...unseen.map(one => el('li', langOf(one), told(one))))] : [])].filter(Boolean) : [];
       const shown = doubts.length ? el('div', {}, ...doubts) : undefined;
-      if (!await confirmed([name], t(to ? 'setup_confirm_control' : 'setup_confirm_give', { drive: name }), button.textContent, shown)) return;
+      if (!await confirmed(shownOf([name]), t(to ? 'setup_confirm_control' : 'setup_confirm_give', { drive: name }), button.textContent, { field: shown })) return;
       button.disabled = true;
       await change(name, to);
       button.disabled = false;

@@ -56,7 +56,7 @@ export function portPanel(scan, look) {
     event.preventDefault();
     const where = ports.querySelector('input[type=radio]:checked')?.value || other.value.trim();
     if (!where) return void other.focus();
-    if (all.checked && !await confirmed([], named(where, `${t('setup_confirm_standstill')} ${t('setup_standstill')}`), t('setup_they_stand'))) return;
+    if (all.checked && !await confirmed({ drives: [] }, named(where, `${t('setup_confirm_standstill')} ${t('setup_standstill')}`), t('setup_they_stand'))) return;
     const isOnlyPort = !/^[a-z+]+:|,/.test(where);
     const line = isOnlyPort && !all.checked ? `${where},${speed.value},${format.value}` : where;
     scan({ line, addresses: addresses.value, standstill: all.checked });

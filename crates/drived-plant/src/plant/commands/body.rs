@@ -9,7 +9,7 @@ use serde::{Deserialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
 use tokio::time::Instant;
 
-use super::{Action, LIFETIME, LONGEST_LIFETIME, Request, Target};
+use super::{Action, Expects, LIFETIME, LONGEST_LIFETIME, Request, Target};
 
 /// How long an id may be.
 const LONGEST_ID: usize = 64;
@@ -20,11 +20,12 @@ pub trait Asks: DeserializeOwned + Send + 'static {
     fn asked(self) -> Asked;
 }
 
-/// What a body says: the caller's id, how long the command may wait until it is sent, and what is to be done.
+/// What a body says: the caller's id, how long the command may wait until it is sent, what he was shown, and what is to be done.
 #[derive(Debug, Clone)]
 pub struct Asked {
     pub id: Option<String>,
     pub expires_in_ms: Option<u64>,
+    pub expects: Option<Expects>,
     pub action: Action,
 }
 
@@ -56,7 +57,7 @@ impl Asked {
     /// # Errors
     /// What is wrong with its id or its expiry, in words.
     pub fn of(self, target: Target, arrived: Instant) -> Result<Request, String> {
-        let Self { id, expires_in_ms, action } = self;
+        let Self { id, expires_in_ms, expects, action } = self;
         if id.as_ref().is_some_and(|id| !is_id(id)) {
             return Err(format!("id: expected 1 to {LONGEST_ID} printable ASCII characters without spaces"));
         }
@@ -64,7 +65,7 @@ impl Asked {
         if lifetime.is_zero() || lifetime > LONGEST_LIFETIME {
             return Err(format!("expires_in_ms: expected 1 to {}", LONGEST_LIFETIME.as_millis()));
         }
-        Ok(Request { id, target, action, lifetime, arrived })
+        Ok(Request { id, target, action, expects, lifetime, arrived })
     }
 }
 
@@ -83,6 +84,8 @@ pub struct Start {
     /// After this time from its arrival it is not sent any more; 1000 unless it is said.
     #[schemars(range(min = 1, max = 10_000))]
     expires_in_ms: Option<u64>,
+    /// What was shown of the drives: it is carried out so, or refused.
+    expects: Option<Expects>,
     /// `forward` unless it is said.
     direction: Option<Direction>,
     /// Given first; without it the motor starts at what the drive holds.
@@ -98,6 +101,8 @@ pub struct Stop {
     /// The caller's name of the command, by which its outcome is found. It need not be new.
     #[schemars(length(min = 1, max = LONGEST_ID))]
     id: Option<String>,
+    /// What was shown of the drives: whoever stands where one of them was shown is stopped too, whatever he is called now.
+    expects: Option<Expects>,
     /// `ramp` unless it is said.
     mode: Option<StopMode>,
     /// For a stop by `dc_injection`: for so long direct current is held to bring the motor to rest, at the most for 30000; unless it
@@ -116,6 +121,8 @@ pub struct NewSetpoint {
     /// After this time from its arrival it is not sent any more; 1000 unless it is said.
     #[schemars(range(min = 1, max = 10_000))]
     expires_in_ms: Option<u64>,
+    /// What was shown of the drives: it is carried out so, or refused.
+    expects: Option<Expects>,
     setpoint: Setpoint,
     /// When it is confirmed; `in_force` unless it is said.
     until: Option<Until>,
@@ -131,6 +138,8 @@ pub struct Plain {
     /// After this time from its arrival it is not sent any more; 1000 unless it is said.
     #[schemars(range(min = 1, max = 10_000))]
     expires_in_ms: Option<u64>,
+    /// What was shown of the drives: it is carried out so, or refused.
+    expects: Option<Expects>,
 }
 
 /// Resets the present fault, once.
@@ -150,16 +159,17 @@ pub struct Release(Plain);
 
 impl Asks for Start {
     fn asked(self) -> Asked {
-        let Self { id, expires_in_ms, direction, setpoint, until } = self;
+        let Self { id, expires_in_ms, expects, direction, setpoint, until } = self;
         let (direction, until) = (direction.unwrap_or(Direction::Forward), until.unwrap_or_default());
-        Asked { id, expires_in_ms, action: Action::Start { direction, setpoint, until } }
+        Asked { id, expires_in_ms, expects, action: Action::Start { direction, setpoint, until } }
     }
 }
 
 impl Asks for NewSetpoint {
     fn asked(self) -> Asked {
-        let Self { id, expires_in_ms, setpoint, until } = self;
-        Asked { id, expires_in_ms, action: Action::Setpoint { setpoint, until: until.unwrap_or_default() } }
+        let Self { id, expires_in_ms, expects, setpoint, until } = self;
+        let action = Action::Setpoint { setpoint, until: until.unwrap_or_default() };
+        Asked { id, expires_in_ms, expects, action }
     }
 }
 
@@ -183,6 +193,7 @@ impl Asks for Save {
 
 impl Plain {
     fn asked_to(self, action: Action) -> Asked {
-        Asked { id: self.id, expires_in_ms: self.expires_in_ms, action }
+        let Self { id, expires_in_ms, expects } = self;
+        Asked { id, expires_in_ms, expects, action }
     }
 }

@@ -6,9 +6,10 @@ use std::{
     time::Duration,
 };
 
+use drive_core::Setpoint;
 use tokio::{sync::watch, time::Instant};
 
-use super::{Action, Rejected, Request, Target};
+use super::{Action, Expects, OutcomeWord, Rejected, Request, Target};
 use crate::plant::views::CommandView;
 use drived_config::rights::Caller;
 
@@ -37,6 +38,7 @@ struct Entry {
     caller: String,
     target: Target,
     action: Action,
+    expects: Option<Expects>,
     lifetime: Duration,
     command: Command,
 }
@@ -64,28 +66,39 @@ impl Log {
         request: Request,
         view: CommandView,
     ) -> Result<Found, Rejected> {
-        let Request { id, target, action, lifetime, arrived } = request;
         let mut entries = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        entries.forget(arrived);
-        let is_once = !matches!(action, Action::Stop(_));
-        if let Some(id) = id.filter(|_| drive_fleet::mutant!("done-twice", is_once, false))
-            && let Some(entry) = entries.by_id.get(&id)
-        {
-            let is_same = entry.caller == caller.name
-                && (&entry.target, entry.action, entry.lifetime) == (&target, action, lifetime);
-            return if is_same {
-                Ok(Found::Again(Arc::clone(&entry.command)))
-            } else {
-                Err(Rejected::IdReused(id))
-            };
+        entries.forget(request.arrived);
+        if let Some(command) = entries.again(caller, &request)? {
+            return Ok(Found::Again(command));
         }
+        let Request { id: _, target, action, expects, lifetime, arrived } = request;
         let id = view.id.clone();
         let command = Arc::new(watch::Sender::new(Arc::new(view)));
         let (caller, told) = (caller.name.clone(), Arc::clone(&command));
-        let entry = Entry { arrived, caller, target, action, lifetime, command: told };
+        let entry = Entry { arrived, caller, target, action, expects, lifetime, command: told };
         entries.by_id.insert(id.clone(), entry);
         entries.order.push_back((arrived, id));
         Ok(Found::New(command))
+    }
+
+    /// The command that this is once more, if it came before.
+    pub(super) fn again(&self, caller: &Caller, request: &Request) -> Result<Option<Command>, Rejected> {
+        let mut entries = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        entries.forget(request.arrived);
+        entries.again(caller, request)
+    }
+
+    /// The setpoints that are on their way to somebody.
+    pub(super) fn setpoints_under_way(&self) -> Vec<(Target, Setpoint)> {
+        let entries = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let given = |entry: &Entry| match entry.action {
+            Action::Setpoint { setpoint, .. } | Action::Start { setpoint: Some(setpoint), .. } => {
+                let is_open = entry.command.borrow().outcome == OutcomeWord::Pending;
+                is_open.then(|| (entry.target.clone(), setpoint))
+            }
+            _ => None,
+        };
+        entries.by_id.values().filter_map(given).collect()
     }
 }
 
@@ -98,6 +111,16 @@ impl Log {
 }
 
 impl Entries {
+    fn again(&self, caller: &Caller, request: &Request) -> Result<Option<Command>, Rejected> {
+        let is_once = !matches!(request.action, Action::Stop(_));
+        let id = request.id.as_ref().filter(|_| drive_fleet::mutant!("done-twice", is_once, false));
+        let Some((id, entry)) = id.and_then(|id| self.by_id.get_key_value(id)) else { return Ok(None) };
+        let is_same = entry.caller == caller.name
+            && (&entry.target, entry.action, &entry.expects, entry.lifetime)
+                == (&request.target, request.action, &request.expects, request.lifetime);
+        if is_same { Ok(Some(Arc::clone(&entry.command))) } else { Err(Rejected::IdReused(id.clone())) }
+    }
+
     /// Forgets what is too old, and the oldest of too many.
     fn forget(&mut self, now: Instant) {
         while let Some((arrived, _)) = self.order.front() {

@@ -4,6 +4,7 @@
 
 mod body;
 mod carry;
+mod expected;
 mod log;
 mod outcome;
 mod said;
@@ -27,6 +28,7 @@ use tokio::{
 pub(super) use self::log::Log;
 pub use self::{
     body::{Asked, Asks, NewSetpoint, Plain, Release, Reset, Save, Start, Stop, is_id},
+    expected::{Expects, Otherwise},
     log::Told,
     outcome::OutcomeWord,
     said::Said,
@@ -52,6 +54,8 @@ pub struct Request {
     pub id: Option<String>,
     pub target: Target,
     pub action: Action,
+    /// What whoever asks was shown; `None`: he means whoever is called so.
+    pub expects: Option<Expects>,
     pub lifetime: Duration,
     /// When it arrived.
     pub arrived: Instant,
@@ -99,6 +103,8 @@ pub enum Rejected {
     NoGroup(String),
     #[error("a stop of {0} came after it")]
     Stopped(String),
+    #[error("it is not as it was shown: {0}")]
+    Otherwise(Otherwise),
     #[error("the id {0:?} was used for another command: expected one that is new, or the same command")]
     IdReused(String),
 }
@@ -110,6 +116,7 @@ impl Rejected {
             Self::NoRight { .. } | Self::OutOfScope { .. } => (OutcomeWord::Refused, "no_right"),
             Self::NoDrive(_) | Self::NoGroup(_) => (OutcomeWord::Refused, "not_found"),
             Self::Stopped(_) => (OutcomeWord::Superseded, "stop"),
+            Self::Otherwise(_) => (OutcomeWord::Refused, "not_as_shown"),
             Self::IdReused(_) => (OutcomeWord::Refused, "id_reused"),
         }
     }
@@ -242,7 +249,14 @@ impl Plant {
             request.arrived = self.0.pulse.asked_after(request.arrived);
         }
         let asked_after = asked_after.min(request.arrived);
-        let meant = self.meant(caller, &request)?;
+        let meant = match self.meant(caller, &mut request) {
+            // What came before is told, also where it has changed what was shown.
+            Err(Rejected::Otherwise(otherwise)) => {
+                let again = self.0.commands.again(caller, &request)?;
+                return again.map(|told| told.subscribe()).ok_or(Rejected::Otherwise(otherwise));
+            }
+            meant => meant?,
+        };
         let meant = Meant::new(&fleet, caller, &request, meant);
         // Held until it is on its way: a start that has passed is not behind a stop that passes after it.
         let mut passing = self.0.stopped.pass();
@@ -303,18 +317,29 @@ impl Plant {
         Ok(told)
     }
 
-    /// The drives that are meant.
-    fn meant(&self, caller: &Caller, request: &Request) -> Result<Vec<DriveHandle>, Rejected> {
+    /// The drives that are meant, and are as they were shown.
+    fn meant(&self, caller: &Caller, request: &mut Request) -> Result<Vec<DriveHandle>, Rejected> {
         let fleet = &self.0.fleet;
         let is_stop = matches!(request.action, Action::Stop(_));
         // Whoever may stop, may stop them all: nobody is looked for by his name.
         if is_stop && request.target == Target::All {
             return Ok(fleet.drives());
         }
-        let may_be_less = is_stop && !matches!(request.target, Target::Drive(_));
         let mut members = Vec::new();
         // A reload gives no name to another drive meanwhile.
         let groups = self.0.groups.read().unwrap_or_else(PoisonError::into_inner);
+        match &request.expects {
+            Some(expects) if is_stop => {
+                let target = std::mem::replace(&mut request.target, Target::All);
+                request.target = self.stopped_by(&groups, target, expects);
+            }
+            Some(expects) => {
+                let names = self.named(&groups, &request.target)?;
+                self.is_as_shown_among(&groups, expects, &names).map_err(Rejected::Otherwise)?;
+            }
+            None => {}
+        }
+        let may_be_less = is_stop && !matches!(request.target, Target::Drive(_));
         for name in self.named(&groups, &request.target)? {
             if !is_stop && !caller.may_command(&name, &groups) {
                 return Err(Rejected::OutOfScope { caller: caller.name.clone(), drive: name });
@@ -433,7 +458,8 @@ mod tests {
         advance(Duration::from_micros(300)).await;
         let (caller, arrived) = (Caller::new("page", "page", Rights::ALL), Instant::now());
         let action = Action::Stop(StopMode::Ramp.into());
-        let request = Request { id: None, target: Target::All, action, lifetime: LIFETIME, arrived };
+        let request =
+            Request { id: None, target: Target::All, action, expects: None, lifetime: LIFETIME, arrived };
         plant.command(&caller, request, Duration::ZERO).await.unwrap();
         assert_eq!(arrived.elapsed(), Duration::ZERO);
     }
@@ -448,7 +474,10 @@ mod tests {
             let action =
                 Action::Start { direction: Direction::Forward, setpoint: None, until: Until::default() };
             let (target, arrived) = (Target::Drive("pump 1".to_owned()), Instant::now());
-            starting.begin(&caller, Request { id: None, target, action, lifetime: LIFETIME, arrived })
+            starting.begin(
+                &caller,
+                Request { id: None, target, action, expects: None, lifetime: LIFETIME, arrived },
+            )
         });
         // It has been let pass and is not handed over yet: no stop can be taken meanwhile.
         let patience = std::time::Instant::now() + Duration::from_secs(20);
@@ -514,7 +543,10 @@ mod tests {
         while inbox.recv().await.is_some() {
             let (action, arrived) = (Action::Stop(StopMode::Ramp.into()), Instant::now());
             let target = Target::Drive("pump 1".to_owned());
-            let _ = plant.begin(&caller, Request { id: None, target, action, lifetime: LIFETIME, arrived });
+            let _ = plant.begin(
+                &caller,
+                Request { id: None, target, action, expects: None, lifetime: LIFETIME, arrived },
+            );
             stops.push(beside.stop(StopMode::Ramp));
         }
         for stop in stops {

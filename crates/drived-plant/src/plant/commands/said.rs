@@ -13,7 +13,7 @@ use drived_words::{
 use serde_json::Value;
 
 use super::{
-    Action, ActionWord,
+    Action, ActionWord, Expects,
     body::{Asked, is_id},
 };
 
@@ -71,18 +71,29 @@ impl Said {
         let injection = injection.filter(|time| mode == StopMode::DcInjection && !time.is_zero());
         let order = StopOrder { mode, injection };
         let id = object.one("id").and_then(Value::as_str).filter(|id| is_id(id)).map(str::to_owned);
-        Self { id, ..Self::plain(Action::Stop(order), object.shown()) }
+        let mut stop = Self { id, ..Self::plain(Action::Stop(order), object.shown()) };
+        // What cannot be understood of it keeps nobody from being stopped.
+        let expects = object.one("expects").and_then(|shown| serde_json::from_value(shown.clone()).ok());
+        if let Ok(asked) = &mut stop.asked {
+            asked.expects = expects;
+        }
+        stop
     }
 
     /// What is asked for without an object.
     pub fn plain(action: Action, body: Value) -> Self {
-        let asked = Asked { id: None, expires_in_ms: None, action };
+        let asked = Asked { id: None, expires_in_ms: None, expects: None, action };
         Self { body, action: Some(action.word()), id: None, issued_unix_ms: None, asked: Ok(asked) }
     }
 
     /// What cannot be understood.
     pub const fn unclear(unclear: Unclear, body: Value) -> Self {
         Self { body, action: None, id: None, issued_unix_ms: None, asked: Err(unclear) }
+    }
+
+    /// What whoever asks was shown.
+    pub fn expects(&self) -> Option<Expects> {
+        self.asked.as_ref().ok().and_then(|asked| asked.expects.clone())
     }
 
     /// How it stops, if it is a stop.

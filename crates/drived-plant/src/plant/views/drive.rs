@@ -21,6 +21,9 @@ pub struct DriveView {
     #[serde(flatten)]
     pub known_as: KnownAs,
     pub line: String,
+    /// At which machine its commands arrive, whatever it is called: its port, family and address, such as `/dev/ttyUSB0 atv312@1`.
+    #[serde(default)]
+    pub place: String,
     pub slave: u8,
     /// The family, such as `atv312`.
     pub family: Cow<'static, str>,
@@ -51,6 +54,7 @@ impl DriveView {
         Self {
             known_as,
             line: line.to_owned(),
+            place: place_of(drive),
             slave: drive.slave().number(),
             family: drive.capabilities().key.into(),
             not_known: not_known(drive),
@@ -63,6 +67,12 @@ impl DriveView {
             snapshot: SnapshotView::from(&*drive.snapshot()),
         }
     }
+}
+
+/// At which machine the commands of a drive arrive, whatever it is called.
+pub fn place_of(drive: &DriveHandle) -> String {
+    let port = drive.line().1.config().endpoint;
+    format!("{port} {}@{}", drive.capabilities().key, drive.slave().number())
 }
 
 /// What its family says that nobody can know; nothing of a family that has no name here.

@@ -28,7 +28,8 @@ fn caller() -> Caller {
 }
 
 fn begin(plant: &Plant, target: Target, action: Action) -> Told {
-    let request = Request { id: None, target, action, lifetime: LIFETIME, arrived: Instant::now() };
+    let request =
+        Request { id: None, target, action, expects: None, lifetime: LIFETIME, arrived: Instant::now() };
     plant.begin(&caller(), request).unwrap()
 }
 
