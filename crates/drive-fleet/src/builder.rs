@@ -484,12 +484,15 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
     let (urgent, urgent_box) = mpsc::unbounded_channel();
     let (snapshots, snapshot) = watch::channel(Arc::new(supervisor.snapshot(now)));
     let (exit, exited) = watch::channel(None);
-    let keeper = Keeper::new(Arc::clone(&name), events.runs.clone(), settings.run_before.clone());
+    let place = settings.place.as_deref().map_or_else(|| Arc::clone(&name), Arc::from);
+    let events = events.at(Arc::clone(&place));
+    let keeper =
+        Keeper::new(Arc::clone(&name), Arc::clone(&place), events.runs.clone(), settings.run_before.clone());
     let answers = line.line.slave(slave.number());
     let settings = Arc::new(settings);
     let desk = Desk {
         supervisor,
-        events: events.clone(),
+        events,
         snapshots,
         exit,
         callers: BTreeMap::new(),
@@ -503,6 +506,7 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
     );
     Arc::new(Entry {
         name,
+        place,
         line,
         slave,
         capabilities,

@@ -32,6 +32,8 @@ use crate::{
 pub struct Event {
     /// The drive.
     pub drive: Arc<str>,
+    /// Where it is ([`DriveSettings::place`](crate::DriveSettings::place)): the same by whatever name.
+    pub place: Arc<str>,
     /// Its place among all events of the fleet, from 1: no two have the same, and what was told later has a higher one,
     /// whatever the wall's clock says.
     pub order: u64,
@@ -52,7 +54,8 @@ impl Event {
     #[must_use]
     pub fn now(drive: impl Into<Arc<str>>, kind: EventKind, cause: Cause) -> Self {
         let Moment { at, wall } = Moment::now();
-        Self { drive: drive.into(), order: 0, at, wall, kind, cause, words: Arc::default() }
+        let drive = drive.into();
+        Self { place: Arc::clone(&drive), drive, order: 0, at, wall, kind, cause, words: Arc::default() }
     }
 }
 
@@ -82,6 +85,8 @@ pub(crate) struct Happened {
 pub(crate) struct Teller {
     events: broadcast::Sender<Event>,
     last: Arc<Mutex<u64>>,
+    /// Where the drive is that tells.
+    place: Arc<str>,
     /// Where it is told what is to be kept of run commands.
     pub(crate) runs: Option<mpsc::UnboundedSender<RunKept>>,
 }
@@ -91,7 +96,12 @@ impl Teller {
         events: broadcast::Sender<Event>,
         runs: Option<mpsc::UnboundedSender<RunKept>>,
     ) -> Self {
-        Self { events, last: Arc::default(), runs }
+        Self { events, last: Arc::default(), place: Arc::from(""), runs }
+    }
+
+    /// The same, for a drive at a place.
+    pub(crate) fn at(&self, place: Arc<str>) -> Self {
+        Self { place, ..self.clone() }
     }
 
     pub(crate) fn subscribe(&self) -> broadcast::Receiver<Event> {
@@ -104,7 +114,8 @@ impl Teller {
         // Told under the lock, so that every reader gets them in their order.
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         *last += 1;
-        let event = Event { drive, order: *last, at, wall, kind, cause, words };
+        let place = Arc::clone(&self.place);
+        let event = Event { drive, place, order: *last, at, wall, kind, cause, words };
         // Without a reader there is nobody to tell.
         let _ = self.events.send(event);
     }

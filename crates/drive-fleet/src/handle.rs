@@ -39,6 +39,7 @@ use crate::{
 /// What the handles of a drive share.
 pub(crate) struct Entry {
     pub(crate) name: Arc<str>,
+    pub(crate) place: Arc<str>,
     pub(crate) line: Arc<LineEntry>,
     pub(crate) slave: SlaveAddress,
     pub(crate) capabilities: &'static Capabilities,
@@ -161,6 +162,12 @@ impl DriveHandle {
     #[must_use]
     pub fn name(&self) -> &Arc<str> {
         &self.entry.name
+    }
+
+    /// Where it is ([`DriveSettings::place`]): the same by whatever name.
+    #[must_use]
+    pub fn place(&self) -> &Arc<str> {
+        &self.entry.place
     }
 
     /// Its address on its line.

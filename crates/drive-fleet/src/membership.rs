@@ -90,6 +90,7 @@ impl Fleet {
         let (told, snapshots) = watch::channel(Arc::new(now));
         let renamed = Arc::new(Entry {
             name,
+            place: Arc::clone(&entry.place),
             line: Arc::clone(&entry.line),
             slave: entry.slave,
             capabilities: entry.capabilities,

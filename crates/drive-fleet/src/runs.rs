@@ -19,8 +19,10 @@ const KEPT_WITHIN: Duration = Duration::from_millis(400);
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct RunKept {
-    /// The drive.
+    /// The drive, by the name that it has now.
     pub drive: Arc<str>,
+    /// By what it is kept: where the drive is ([`DriveSettings::place`](crate::DriveSettings::place)), whatever it is called.
+    pub place: Arc<str>,
     /// The run command that stands, or is about to be given, and the stop that is not confirmed; `None`: none of this side stands any
     /// more, and no stop is under way, as the drive's own words have shown.
     pub run: Option<RunRecord>,
@@ -41,6 +43,7 @@ impl RunKept {
 #[derive(Debug)]
 pub(crate) struct Keeper {
     drive: Arc<str>,
+    place: Arc<str>,
     keeps: Option<mpsc::UnboundedSender<RunKept>>,
     told: Option<RunRecord>,
 }
@@ -48,10 +51,11 @@ pub(crate) struct Keeper {
 impl Keeper {
     pub(crate) fn new(
         drive: Arc<str>,
+        place: Arc<str>,
         keeps: Option<mpsc::UnboundedSender<RunKept>>,
         kept: Option<RunRecord>,
     ) -> Self {
-        let mut keeper = Self { drive, keeps, told: None };
+        let mut keeper = Self { drive, place, keeps, told: None };
         if kept.is_some() {
             // Who keeps it may have had it under another name.
             keeper.tell(kept, None);
@@ -88,16 +92,14 @@ impl Keeper {
         }
     }
 
-    /// The drive may be called otherwise now: what is kept of it is kept by the name that it has.
+    /// The drive may be called otherwise now: what is kept of it has the name that it has.
     pub(crate) fn follow_name(&mut self, name: Arc<str>) {
         if self.drive == name {
             return;
         }
-        let old = std::mem::replace(&mut self.drive, name);
-        // First by the new one: a program that is killed between both has told of the run twice, and not never.
+        self.drive = name;
         if let Some(run) = self.told.clone() {
             self.tell(Some(run), None);
-            self.send(old, None, None);
         }
     }
 
@@ -114,12 +116,9 @@ impl Keeper {
 
     fn tell(&mut self, run: Option<RunRecord>, kept: Option<oneshot::Sender<()>>) {
         self.told.clone_from(&run);
-        self.send(Arc::clone(&self.drive), run, kept);
-    }
-
-    fn send(&self, drive: Arc<str>, run: Option<RunRecord>, kept: Option<oneshot::Sender<()>>) {
         if let Some(keeps) = &self.keeps {
-            let _ = keeps.send(RunKept { drive, run, kept });
+            let (drive, place) = (Arc::clone(&self.drive), Arc::clone(&self.place));
+            let _ = keeps.send(RunKept { drive, place, run, kept });
         }
     }
 }
@@ -143,7 +142,8 @@ mod tests {
     #[test]
     fn a_stop_is_kept_with_its_run_and_the_identity_of_the_start_until_it_is_over() {
         let (keeps, kept) = mpsc::unbounded_channel();
-        let mut keeper = Keeper::new(Arc::from("pump"), Some(keeps), None);
+        let mut keeper =
+            Keeper::new(Arc::from("pump"), Arc::from("/dev/ttyUSB0 atv312@1"), Some(keeps), None);
         keeper.follow(Some(RUN), None, || Some("one".to_owned()));
         // Its line was lost: it has not said anew which it is.
         keeper.follow(Some(RUN), Some(StopMode::Ramp.into()), || None);
@@ -158,9 +158,32 @@ mod tests {
     }
 
     #[test]
+    fn a_run_is_kept_by_the_place_of_its_drive_whatever_that_is_called() {
+        let (keeps, mut kept) = mpsc::unbounded_channel();
+        let place: Arc<str> = Arc::from("/dev/ttyUSB0 atv312@1");
+        let mut keeper = Keeper::new(Arc::from("north"), Arc::clone(&place), Some(keeps), None);
+        keeper.follow(Some(RUN), None, || Some("one".to_owned()));
+        keeper.follow_name(Arc::from("south"));
+        keeper.follow(None, None, || None);
+        let told = std::iter::from_fn(|| kept.try_recv().ok());
+        let told: Vec<_> = told.map(|kept| (kept.drive, kept.place, kept.run)).collect();
+        let [north, south] = ["north", "south"].map(Arc::<str>::from);
+        let run = record(Some(RUN), None);
+        assert_eq!(
+            told,
+            [
+                (north, Arc::clone(&place), run.clone()),
+                (Arc::clone(&south), Arc::clone(&place), run),
+                (south, place, None)
+            ]
+        );
+    }
+
+    #[test]
     fn a_stop_is_kept_with_its_seconds_behind_the_run_command_that_it_has_ended() {
         let (keeps, kept) = mpsc::unbounded_channel();
-        let mut keeper = Keeper::new(Arc::from("pump"), Some(keeps), None);
+        let mut keeper =
+            Keeper::new(Arc::from("pump"), Arc::from("/dev/ttyUSB0 atv312@1"), Some(keeps), None);
         let held = Some(StopOrder::injecting(Duration::from_secs(20)));
         keeper.follow(Some(RUN), None, || Some("one".to_owned()));
         keeper.follow(Some(RUN), held, || None);
@@ -177,7 +200,8 @@ mod tests {
     #[test]
     fn a_stop_of_a_motor_that_somebody_else_runs_is_kept_with_the_drive_that_it_was_asked_of() {
         let (keeps, kept) = mpsc::unbounded_channel();
-        let mut keeper = Keeper::new(Arc::from("pump"), Some(keeps), None);
+        let mut keeper =
+            Keeper::new(Arc::from("pump"), Arc::from("/dev/ttyUSB0 atv312@1"), Some(keeps), None);
         let fast = Some(StopMode::Fast.into());
         keeper.follow(None, fast, || None);
         keeper.follow(None, fast, || Some("one".to_owned()));

@@ -12,12 +12,12 @@ use crate::{
 };
 
 /// Declares the settings of a drive, each once: what it is, its type, and what serde has to know beside that. What nobody has
-/// set is the default of its type. What is known from an earlier run is no setting.
+/// set is the default of its type. What is known of it besides is no setting.
 macro_rules! settings {
     (
         $(#[$of_all:meta])*
         pub struct $name:ident { $($(#[$of_one:meta])* pub $setting:ident: $type:ty,)* }
-        from an earlier run { $($(#[$of_kept:meta])* pub $kept:ident: $type_kept:ty,)* }
+        known besides { $($(#[$of_kept:meta])* pub $kept:ident: $type_kept:ty,)* }
     ) => {
         $(#[$of_all])*
         #[derive(Debug, Clone, PartialEq, Eq)]
@@ -128,7 +128,11 @@ settings! {
         #[cfg_attr(feature = "schemars", schemars(with = "Option<u64>"))]
         pub injection: Option<Duration>,
     }
-    from an earlier run {
+    known besides {
+        /// Where it is, whatever it is called, such as its port, its address and its family: by this whoever keeps something of it
+        /// ([`RunKept::place`](crate::RunKept::place), [`Event::place`](crate::Event::place)) knows it again. `None`: by the name that it
+        /// had first. It holds as long as the drive is in the fleet.
+        pub place: Option<String>,
         /// What it said it was; `None`: what it says first is remembered.
         pub identity: Option<Identity>,
         /// What was found of its communication watchdog before it was armed, where nobody lived to put that back.
@@ -155,6 +159,12 @@ pub struct Left {
 }
 
 impl DriveSettings {
+    /// These settings, for a drive at this [place](Self::place).
+    #[must_use]
+    pub fn at(self, place: impl Into<String>) -> Self {
+        Self { place: Some(place.into()), ..self }
+    }
+
     /// These settings, for a drive of which a run before has left this. What the settings say themselves of its identity counts.
     #[must_use]
     pub fn after(self, left: Left) -> Self {

@@ -14,6 +14,7 @@ pub mod config;
 pub mod host;
 pub mod kept;
 pub mod names;
+pub mod places;
 pub mod profiles;
 pub mod records;
 pub mod rights;

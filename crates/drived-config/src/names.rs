@@ -16,7 +16,8 @@ use serde::{Deserialize, Serialize};
 pub use self::table::{Configured, Kind, Known, Named, Table, Told, topic_id};
 use crate::{
     config::{Group, LinePart},
-    kept::{Kept, Readers},
+    kept::{Kept, Stale},
+    places::place,
 };
 
 /// How many drives a virtual unit has places for.
@@ -55,7 +56,7 @@ pub fn configured(lines: &[LinePart], groups: &[Group]) -> Configured {
         let port = line.config.endpoint.to_string();
         there.drives.extend(line.drives.iter().map(|drive| Named {
             name: drive.settings.name.clone(),
-            place: format!("{port} {}", drive.name),
+            place: place(&line.config.endpoint, drive.name),
             slot: drive.slot,
         }));
         there.lines.push(Named { name: line.name.clone(), place: port, slot: None });
@@ -90,7 +91,7 @@ impl Default for Inner {
 impl Names {
     /// Those of this state folder; without one everything follows the configuration, from start to start.
     pub fn in_folder(folder: Option<&Path>) -> Self {
-        let file = folder.map(|folder| Kept::at(&place(folder)));
+        let file = folder.map(|folder| Kept::at(&file_in(folder)));
         Self(Arc::new(Mutex::new(Inner { file, ..Inner::default() })))
     }
 
@@ -184,8 +185,14 @@ pub fn revision(slots: &[Option<Arc<str>>]) -> u16 {
 }
 
 /// The file of a state folder.
-pub fn place(folder: &Path) -> PathBuf {
+pub fn file_in(folder: &Path) -> PathBuf {
     folder.join(FILE)
+}
+
+/// Where drives were by the configuration before this one, and those of before that are gone; none where nobody can say.
+pub fn places_before(folder: Option<&Path>) -> Vec<String> {
+    let kept = folder.and_then(|folder| read(&Kept::at(&file_in(folder))).ok());
+    kept.map(|table| table.drives.into_iter().map(|known| known.place).collect()).unwrap_or_default()
 }
 
 /// What is kept in a file; nothing before the first start.
@@ -245,7 +252,8 @@ pub fn changed<T>(
 }
 
 fn write(file: &Kept, table: &Table) -> io::Result<()> {
-    file.replace(&serde_json::to_vec_pretty(table)?, Readers::Owner)
+    // What it has follows from the configuration once more; without it nobody would have the number that he had.
+    Ok(file.secure(serde_json::to_vec_pretty(table), Stale::Left)?)
 }
 
 /// Puts what is kept aside, where it can be looked at, and numbers what there is anew. Gives where it is now.

@@ -1,112 +1,288 @@
-//! What is kept of each drive in a file of the state folder, beyond the life of the program.
+//! What is kept of each drive in a file of the state folder, beyond the life of the program: by the place of the drive, for it belongs to
+//! a machine and not to a name.
 
 use std::{
     collections::BTreeMap,
     io,
     path::{Path, PathBuf},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
-use drive_fleet::{Event, EventKind, Events, Received};
-use serde::{Serialize, de::DeserializeOwned};
+use drive_fleet::{EepromLedger, Event, EventKind, Events, Received, RunRecord, WatchdogBefore};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use tokio::task::{JoinHandle, spawn_blocking};
 
-use crate::kept::{Kept, Readers};
+use crate::{
+    kept::{Kept, Stale},
+    places::Places,
+};
 
-/// One record of each drive, in a file.
-#[derive(Debug)]
-pub struct Records<T> {
-    file: Option<Kept>,
-    drives: BTreeMap<String, T>,
-    /// Writing has failed, which is told once.
-    failing: bool,
-    /// What is not so while they cannot be kept.
-    loss: &'static str,
+/// What is kept of a drive.
+pub trait Record: Serialize + DeserializeOwned + Clone + PartialEq {
+    /// What is so where the file cannot be read, or could not be written.
+    const LOSS: &'static str;
+    /// What becomes of the file where it cannot be written.
+    const STALE: Stale = Stale::Emptied;
+
+    /// Whether a stop is in it that was not confirmed.
+    fn stops(&self) -> bool {
+        false
+    }
+
+    /// What is so where the configuration has nobody at its place, in words.
+    fn alone(&self) -> &'static str;
 }
 
-impl<T: Serialize + DeserializeOwned + PartialEq> Records<T> {
-    /// Reads the file. One that cannot be read keeps no motor from being watched: `loss` says what is missing then.
-    pub fn open(file: Option<&Path>, loss: &'static str) -> Self {
-        let file = file.map(Kept::at);
-        let read = file.as_ref().map(|file| match file.read() {
-            Ok(Some((text, _))) => serde_json::from_slice(&text).map_err(io::Error::from),
-            Ok(None) => Ok(BTreeMap::new()),
-            Err(error) => Err(error),
-        });
-        let drives = read.unwrap_or_else(|| Ok(BTreeMap::new())).unwrap_or_else(|error| {
-            let file = file.as_ref().map_or(Path::new(""), Kept::path).display();
-            tracing::warn!("{file}: {error}: {loss}");
-            BTreeMap::new()
-        });
-        Self { file, drives, failing: false, loss }
+impl Record for RunRecord {
+    const LOSS: &'static str = "no motor that turns is taken for one of ours, and no stop is given anew that was not confirmed: A MOTOR MAY TURN";
+
+    fn stops(&self) -> bool {
+        self.stop.is_some()
     }
 
-    /// The record of a drive.
-    pub fn of(&self, drive: &str) -> Option<&T> {
-        self.drives.get(drive)
-    }
-
-    /// Has this be the record of a drive. Gives whether the file is to be written for it.
-    pub fn set(&mut self, drive: &str, record: Option<T>) -> bool {
-        match record {
-            Some(record) if self.drives.get(drive) == Some(&record) => false,
-            Some(record) => {
-                self.drives.insert(drive.to_owned(), record);
-                true
-            }
-            None => self.drives.remove(drive).is_some(),
+    fn alone(&self) -> &'static str {
+        match self.stop {
+            Some(_) => "a stop of it was not confirmed, and nobody gives it: THE MOTOR MAY TURN",
+            None => "a run command of this program may stand in it: THE MOTOR MAY TURN",
         }
     }
+}
 
-    /// The drive is called otherwise: its record goes with it. Gives whether the file is to be written for it.
-    pub fn rename(&mut self, old: &str, new: &str) -> bool {
-        let Some(record) = self.drives.remove(old) else { return false };
-        self.drives.insert(new.to_owned(), record);
+impl Record for WatchdogBefore {
+    const LOSS: &'static str = "watchdogs that an earlier run, or one that is killed, has armed stay armed";
+
+    fn alone(&self) -> &'static str {
+        "its watchdog may be armed by this program"
+    }
+}
+
+impl Record for EepromLedger {
+    const LOSS: &'static str = "the writes to EEPROM since the last that was kept are not counted";
+    // One that counts too few is better than one that begins anew.
+    const STALE: Stale = Stale::Left;
+
+    fn alone(&self) -> &'static str {
+        "its EEPROM was written"
+    }
+}
+
+/// One record of each drive, in a file. Cheap to clone.
+#[derive(Debug, Clone)]
+pub struct Records<T>(Arc<Mutex<Inner<T>>>);
+
+#[derive(Debug)]
+struct Inner<T> {
+    file: Option<Kept>,
+    /// By the places of the drives, or the names where a version before this one has kept no place.
+    drives: BTreeMap<String, Entry<T>>,
+    /// Writing has failed, which is told once.
+    failing: bool,
+}
+
+#[derive(Debug)]
+struct Entry<T> {
+    /// What the drive was called; `None`: nobody has kept where it is, and what is by the names is its name.
+    name: Option<String>,
+    record: T,
+    /// Nobody is there.
+    is_alone: bool,
+}
+
+/// As it stands in the file.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged, deny_unknown_fields)]
+enum Written<T> {
+    /// By the place.
+    At { drive: String, record: T },
+    /// By the name.
+    Of(T),
+}
+
+impl<T: Record> Records<T> {
+    /// Reads the file, and gives what stands in it to whom it belongs. What belongs to nobody is told, and kept. A file that cannot be read
+    /// keeps no motor from being watched: it is told what is missing then.
+    pub fn open(file: Option<&Path>, places: &Places) -> Self {
+        let file = file.map(Kept::at);
+        let told = file.as_ref().map_or(Path::new(""), Kept::path).display().to_string();
+        let read = file.as_ref().map_or_else(|| Ok(BTreeMap::new()), read::<T>);
+        let read = read.unwrap_or_else(|error| {
+            tracing::error!("{told}: {error}: {}", T::LOSS);
+            BTreeMap::new()
+        });
+        let (mut drives, mut others, mut is_other) = (BTreeMap::new(), Vec::new(), false);
+        for (key, written) in read {
+            let (name, place, record) = match written {
+                Written::At { drive, record } => (drive, Some(key), record),
+                Written::Of(record) => (key, None, record),
+            };
+            match place.as_deref().and_then(|place| Some((place, places.name_at(place)?))) {
+                Some((place, now)) => {
+                    is_other |= now != name;
+                    drives.insert(place.to_owned(), Entry::of(now, record));
+                }
+                None => others.push((name, place, record)),
+            }
+        }
+        // Whoever is at the place of a record comes first.
+        for (name, place, record) in others {
+            let at = place.as_deref().unwrap_or("a place that was not kept");
+            let now = places.now(&name, place.as_deref(), record.stops());
+            if let Some(now) = now.filter(|now| !drives.contains_key(*now)) {
+                if place.is_some() {
+                    let text = format!(
+                        "{told}: {name} was at {at}, where nobody is any more, and what was kept of it goes to {name} at {now}. If these are \
+                         two drives: {} at {at}",
+                        record.alone()
+                    );
+                    tell(&record, &text);
+                }
+                is_other = true;
+                drives.insert(now.to_owned(), Entry::of(&name, record));
+                continue;
+            }
+            let text = format!(
+                "{told}: {name} at {at} is not in the configuration: {}; it is kept until it is there again",
+                record.alone()
+            );
+            tell(&record, &text);
+            let (key, name) = match place {
+                Some(place) => (place, Some(name)),
+                None => (name, None),
+            };
+            drives.insert(key, Entry { name, record, is_alone: true });
+        }
+        let records = Self(Arc::new(Mutex::new(Inner { file, drives, failing: false })));
+        if is_other {
+            // What is there says the same, in other words.
+            records.write_or(Stale::Left);
+        }
+        records
+    }
+
+    /// The record of the drive at a place.
+    pub fn of(&self, place: &str) -> Option<T> {
+        self.lock().drives.get(place).map(|entry| entry.record.clone())
+    }
+
+    /// The records of those who are there: by their places, with their names.
+    pub fn all(&self) -> Vec<(String, String, T)> {
+        let there = |(place, entry): (&String, &Entry<T>)| {
+            let name = entry.name.clone().filter(|_| !entry.is_alone)?;
+            Some((place.clone(), name, entry.record.clone()))
+        };
+        self.lock().drives.iter().filter_map(there).collect()
+    }
+
+    /// Has this be the record of the drive at a place, which is called so now. Gives whether the file is to be written for it.
+    pub fn set(&self, place: &str, drive: &str, record: Option<T>) -> bool {
+        let mut inner = self.lock();
+        let Some(record) = record else { return inner.drives.remove(place).is_some() };
+        let new = Entry::of(drive, record);
+        let before = inner.drives.get(place);
+        let is_same =
+            |before: &Entry<T>| before.record == new.record && before.name == new.name && !before.is_alone;
+        if before.is_some_and(is_same) {
+            return false;
+        }
+        inner.drives.insert(place.to_owned(), new);
         true
     }
 
-    /// Writes the file. What cannot be written is told once, until it can be again.
-    pub fn write(&mut self) {
-        let Some(file) = &self.file else { return };
-        let written = serde_json::to_vec_pretty(&self.drives)
-            .map_err(io::Error::from)
-            .and_then(|text| file.replace(&text, Readers::Owner));
-        if let (Err(error), false) = (&written, self.failing) {
-            tracing::warn!("{}: {error}: {}", file.path().display(), self.loss);
+    /// The same for all that are there: who is not among these has none.
+    pub fn set_all(&self, all: impl IntoIterator<Item = (String, String, T)>) {
+        let mut inner = self.lock();
+        inner.drives.retain(|_, entry| entry.is_alone);
+        let all = all.into_iter().map(|(place, drive, record)| (place, Entry::of(&drive, record)));
+        inner.drives.extend(all);
+    }
+
+    /// The drive at a place is called so now. Gives whether the file is to be written for it.
+    pub fn call(&self, place: &str, drive: &str) -> bool {
+        let record = self.of(place);
+        record.is_some() && self.set(place, drive, record)
+    }
+
+    /// Writes the file; whether it could be. What cannot be written is told once, until it can be again.
+    pub fn write(&self) -> bool {
+        self.write_or(T::STALE)
+    }
+
+    fn write_or(&self, stale: Stale) -> bool {
+        let (file, text) = {
+            let inner = self.lock();
+            let Some(file) = inner.file.clone() else { return true };
+            let written = |(key, entry): (&String, &Entry<T>)| {
+                let record = entry.record.clone();
+                let written = match entry.name.clone() {
+                    Some(drive) => Written::At { drive, record },
+                    None => Written::Of(record),
+                };
+                (key.clone(), written)
+            };
+            let all: BTreeMap<_, _> = inner.drives.iter().map(written).collect();
+            (file, serde_json::to_vec_pretty(&all))
+        };
+        let written = file.secure(text, stale);
+        let mut inner = self.lock();
+        if let (Err(error), false) = (&written, inner.failing) {
+            tracing::error!("{}: {error} {}", file.path().display(), T::LOSS);
         }
-        self.failing = written.is_err();
+        inner.failing = written.is_err();
+        written.is_ok()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner<T>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl<T> Entry<T> {
+    fn of(name: &str, record: T) -> Self {
+        Self { name: Some(name.to_owned()), record, is_alone: false }
+    }
+}
+
+fn tell(record: &impl Record, text: &str) {
+    if record.stops() {
+        tracing::error!("{text}");
+    } else {
+        tracing::warn!("{text}");
+    }
+}
+
+fn read<T: Record>(file: &Kept) -> io::Result<BTreeMap<String, Written<T>>> {
+    match file.read_secured()? {
+        Some(text) => Ok(serde_json::from_slice(&text)?),
+        None => Ok(BTreeMap::new()),
     }
 }
 
 /// Follows the drives until the fleet ends: `note` says whether the file is another after an event.
 pub fn follow<T>(
-    mut records: Records<T>,
+    records: Records<T>,
     mut events: Events,
-    note: fn(&mut Records<T>, &str, &EventKind) -> bool,
+    note: fn(&Records<T>, &Event) -> bool,
 ) -> JoinHandle<()>
 where
-    T: Serialize + DeserializeOwned + PartialEq + Send + 'static,
+    T: Record + Send + 'static,
 {
     tokio::spawn(async move {
         loop {
-            let Event { drive, kind, .. } = match events.recv().await {
+            let event = match events.recv().await {
                 Received::Event(event) => event,
                 Received::Missed(_) => continue,
                 Received::End => return,
             };
-            let is_another = match &kind {
-                EventKind::Renamed(old) => records.rename(old, &drive),
-                kind => note(&mut records, &drive, kind),
+            let is_another = match &event.kind {
+                EventKind::Renamed(_) => records.call(&event.place, &event.drive),
+                _ => note(&records, &event),
             };
             if !is_another {
                 continue;
             }
-            let written = spawn_blocking(move || {
-                records.write();
-                records
-            });
+            let writing = records.clone();
             // The runtime ends.
-            let Ok(back) = written.await else { return };
-            records = back;
+            let Ok(_) = spawn_blocking(move || writing.write()).await else { return };
         }
     })
 }
@@ -117,31 +293,4 @@ pub fn in_folder(folder: Option<&Path>, name: &str) -> Option<PathBuf> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::fs;
-
-    use super::*;
-
-    #[test]
-    fn what_was_kept_is_known_after_a_kill_and_half_a_file_says_nothing() {
-        let folder = std::env::temp_dir().join(format!("drived-records-{}", std::process::id()));
-        let file = folder.join("state").join("numbers.json");
-        let open = || Records::<u32>::open(Some(&file), "nothing is known");
-        let mut records = open();
-        assert!(records.set("pump 1", Some(7)));
-        assert!(!records.set("pump 1", Some(7)), "nothing is written twice");
-        records.write();
-        // The program was killed.
-        let mut records = open();
-        assert_eq!((records.of("pump 1"), records.of("pump 2")), (Some(&7), None));
-        assert!(records.rename("pump 1", "mixer") && !records.rename("pump 1", "mixer"));
-        assert_eq!((records.of("pump 1"), records.of("mixer")), (None, Some(&7)));
-        assert!(records.rename("mixer", "pump 1"));
-        assert!(records.set("pump 1", None) && !records.set("pump 1", None));
-        records.write();
-        assert_eq!(open().of("pump 1"), None);
-        fs::write(&file, "{\"pump 1\":").unwrap();
-        assert_eq!(open().of("pump 1"), None);
-        fs::remove_dir_all(folder).unwrap();
-    }
-}
+mod tests;

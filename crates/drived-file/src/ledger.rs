@@ -1,19 +1,22 @@
 //! Where the writes to the EEPROM of a drive on a line are counted that no daemon writes: in the ledger of the daemon that has the
 //! drive otherwise.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use drive_bus::LineConfig;
 use drive_fleet::{EEPROM_WRITES_A_DAY, EepromLedger};
 
 use crate::Config;
-use drived_config::{kept::Kept, records::Records};
+use drived_config::{
+    kept::Kept,
+    names::places_before,
+    places::{Places, place},
+    records::Records,
+};
 use drived_words::{drive_spec::DriveName, output};
 
 /// The file of the state folder.
 pub const FILE: &str = "eeprom.json";
-/// What is not so where they cannot be kept.
-pub const LOSS: &str = "the next run of this program counts the writes to EEPROM anew";
 /// What is said where a write is counted nowhere.
 const NOT_COUNTED: &str = "the writes to the drive's EEPROM are counted nowhere";
 
@@ -29,26 +32,38 @@ pub struct LedgerArgs {
 /// The ledger of one drive.
 #[derive(Debug)]
 pub struct Ledger {
-    /// The file and the drive's name in it, or why there is none.
-    place: Result<(PathBuf, String), String>,
+    /// Where it is, or why there is none.
+    found: Result<Found, String>,
     is_told: bool,
+}
+
+/// The ledger of a daemon, and the drive in it.
+#[derive(Debug)]
+struct Found {
+    file: PathBuf,
+    places: Places,
+    name: String,
+    place: String,
 }
 
 impl LedgerArgs {
     /// The ledger of a drive on a line.
     pub fn of(&self, name: DriveName, line: &LineConfig) -> Ledger {
-        Ledger { place: self.place(name, line), is_told: false }
+        Ledger { found: self.find(name, line), is_told: false }
     }
 
-    fn place(&self, name: DriveName, line: &LineConfig) -> Result<(PathBuf, String), String> {
+    fn find(&self, name: DriveName, line: &LineConfig) -> Result<Found, String> {
         let config = Config::load(&self.config).map_err(|error| error.to_string())?;
         let file = self.config.display();
         let lines = config.lines.iter().filter(|part| part.config.endpoint == line.endpoint);
         let mut drives = lines.flat_map(|line| &line.drives);
         let drive = drives.find(|drive| drive.name == name);
         let drive = drive.ok_or_else(|| format!("{file} has no {name} on this line"))?;
-        let folder = config.doors.state.folder.ok_or_else(|| format!("{file} has no state folder"))?;
-        Ok((folder.join(FILE), drive.settings.name.clone()))
+        let name = drive.settings.name.clone();
+        let folder = config.doors.state.folder.as_deref();
+        let folder = folder.ok_or_else(|| format!("{file} has no state folder"))?;
+        let places = Places::of(&config.lines).after(places_before(Some(folder)));
+        Ok(Found { file: folder.join(FILE), places, name, place: place(&line.endpoint, drive.name) })
     }
 }
 
@@ -58,14 +73,15 @@ impl Ledger {
         if writes == 0 {
             return;
         }
-        match &self.place {
-            Ok((file, drive)) => match counted(file, drive, writes) {
+        match &self.found {
+            Ok(found) => match found.counted(writes) {
                 Ok(ledger) if ledger.is_worn() => output::complain(format_args!(
-                    "ALARM: the EEPROM of {drive} is written too often: {ledger}, and {EEPROM_WRITES_A_DAY} a day are an alarm"
+                    "ALARM: the EEPROM of {} is written too often: {ledger}, and {EEPROM_WRITES_A_DAY} a day are an alarm",
+                    found.name
                 )),
                 Ok(_) => {}
                 Err(error) => {
-                    output::complain(format_args!("{}: {error}: {}", file.display(), NOT_COUNTED));
+                    output::complain(format_args!("{}: {error}: {}", found.file.display(), NOT_COUNTED));
                 }
             },
             Err(why) if !self.is_told => {
@@ -77,32 +93,36 @@ impl Ledger {
     }
 }
 
-fn counted(file: &Path, drive: &str, writes: usize) -> std::io::Result<EepromLedger> {
-    // Two at once would each forget what the other has written.
-    let _lock = Kept::at(file).lock()?;
-    let mut records = Records::open(Some(file), LOSS);
-    let mut ledger: EepromLedger = records.of(drive).cloned().unwrap_or_default();
-    (0..writes).for_each(|_| ledger.count());
-    records.set(drive, Some(ledger.clone()));
-    records.write();
-    Ok(ledger)
+impl Found {
+    fn counted(&self, writes: usize) -> std::io::Result<EepromLedger> {
+        // Two at once would each forget what the other has written.
+        let _lock = Kept::at(&self.file).lock()?;
+        let records = Records::open(Some(&self.file), &self.places);
+        let mut ledger: EepromLedger = records.of(&self.place).unwrap_or_default();
+        (0..writes).for_each(|_| ledger.count());
+        records.set(&self.place, &self.name, Some(ledger.clone()));
+        records.write();
+        Ok(ledger)
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use drive_core::SerialSettings;
     use drive_fleet::WatchdogContract;
 
     use super::*;
     use drived_config::testing::Folder;
 
+    const PLACE: &str = "/dev/ttyUSB0 atv312@1";
+
     /// Where the ledger of a drive on some line is.
-    fn of(config: &Path) -> Result<(PathBuf, String), String> {
+    fn of(config: &Path) -> Result<Found, String> {
         let line = LineConfig::stream(SerialSettings::MODBUS_DEFAULT);
-        LedgerArgs { config: config.to_owned() }.place(
-            "atv312@1".parse::<drived_words::drive_spec::DriveSpec>().unwrap().single().unwrap(),
-            &line,
-        )
+        LedgerArgs { config: config.to_owned() }
+            .find("atv312@1".parse::<drived_words::drive_spec::DriveSpec>().unwrap().single().unwrap(), &line)
     }
 
     #[test]
@@ -114,19 +134,23 @@ mod tests {
             reaction: drive_core::Reaction::Ramp,
         };
         let in_vain = Some(drive_fleet::InVain { identity: None, contract });
-        let mut records = Records::open(Some(&file), LOSS);
+        let places: Places = [("pump".to_owned(), PLACE.to_owned())].into_iter().collect();
+        let kept = || Records::<EepromLedger>::open(Some(&file), &places);
+        let records = kept();
         let mut of_daemon = EepromLedger { in_vain: in_vain.clone(), ..EepromLedger::default() };
         of_daemon.count();
-        records.set("pump", Some(of_daemon));
+        records.set(PLACE, "pump", Some(of_daemon));
         records.write();
-        let mut ledger = Ledger { place: Ok((file.clone(), "pump".to_owned())), is_told: false };
+        let (name, place) = ("pump".to_owned(), PLACE.to_owned());
+        let found = Found { file: file.clone(), places: places.clone(), name, place };
+        let mut ledger = Ledger { found: Ok(found), is_told: false };
         ledger.count(0);
         ledger.count(2);
-        let kept: EepromLedger = Records::open(Some(&file), LOSS).of("pump").cloned().unwrap();
-        assert_eq!((kept.writes, kept.today, kept.is_worn()), (3, 3, false));
-        assert_eq!(kept.in_vain, in_vain);
+        let now = kept().of(PLACE).unwrap();
+        assert_eq!((now.writes, now.today, now.is_worn()), (3, 3, false));
+        assert_eq!(now.in_vain, in_vain);
         ledger.count(usize::try_from(EEPROM_WRITES_A_DAY).unwrap());
-        assert!(Records::<EepromLedger>::open(Some(&file), LOSS).of("pump").unwrap().is_worn());
+        assert!(kept().of(PLACE).unwrap().is_worn());
     }
 
     #[test]

@@ -24,11 +24,16 @@ struct Plant {
 
 impl Plant {
     fn new(name: &str) -> Self {
-        let sim = Sim::serve(name, &["atv312@1"]);
+        Self::of(name, &[("atv312@1", "pump")])
+    }
+
+    /// With these drives, each with its name.
+    fn of(name: &str, drives: &[(&str, &str)]) -> Self {
+        let sim = Sim::serve(name, &drives.iter().map(|(drive, _)| *drive).collect::<Vec<_>>());
         let state = path(&format!("{name}-state"));
+        let drives: String = drives.iter().map(|(drive, name)| table(drive, name)).collect();
         let text = format!(
-            "state = \"{}\"\n[http]\nlisten = \"off\"\n[lines.bench]\nport = \"{},19200,8E1\"\n[[drives]]\n\
-             line = \"bench\"\ndrive = \"atv312@1\"\nname = \"pump\"\ncontrol = true\n",
+            "state = \"{}\"\n[http]\nlisten = \"off\"\n[lines.bench]\nport = \"{},19200,8E1\"\n{drives}",
             state.display(),
             sim.link()
         );
@@ -68,6 +73,11 @@ impl Plant {
     fn shown(&self) -> String {
         self.sim.on("atv312@1", &["status"]).out
     }
+}
+
+/// The table of a drive in the file.
+fn table(drive: &str, name: &str) -> String {
+    format!("[[drives]]\nline = \"bench\"\ndrive = \"{drive}\"\nname = \"{name}\"\ncontrol = true\n")
 }
 
 impl Drop for Plant {
@@ -111,6 +121,60 @@ fn a_stop_that_was_not_confirmed_when_the_daemon_was_killed_is_given_anew_by_the
     assert_eq!(code, Some(0), "{last}");
     assert!(!plant.shown().contains("running"), "{}", plant.shown());
     assert_eq!(plant.kept().trim(), "{}", "it was seen to stand no more");
+}
+
+/// Two drives, of which the first, `north`, has a stop that was not confirmed when the daemon was killed; somebody else runs the second since.
+fn with_a_stop_pending(name: &str) -> Plant {
+    let mut plant = Plant::of(name, &[("atv312@1", "north"), ("atv312@2", "south")]);
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"identified""#);
+    daemon.wait_for(r#""event":"identified""#);
+    run(&["start", "north", "--setpoint", "20Hz", "--socket", &plant.socket]).assert_done();
+    plant.sim.say("line cut", "done");
+    let stopped = run(&["stop", "north", "--socket", &plant.socket]);
+    assert_ne!(stopped.code, Some(0), "{stopped:?}");
+    daemon.signal("-KILL");
+    assert_eq!(daemon.end().0, None);
+    plant.sim.say("line join", "done");
+    let started = plant.sim.on("atv312@2", &["start", "--setpoint", "15Hz"]);
+    assert_eq!(started.code, Some(0), "{started:?}");
+    plant
+}
+
+#[test]
+fn a_stop_that_was_not_confirmed_is_given_to_its_machine_where_the_names_were_exchanged_since() {
+    let plant = with_a_stop_pending("kept-exchanged");
+    let text = fs::read_to_string(plant.file.path()).expect("it is there");
+    let exchanged =
+        text.replace("\"north\"", "\"@\"").replace("\"south\"", "\"north\"").replace("\"@\"", "\"south\"");
+    fs::write(plant.file.path(), exchanged).expect("it can be written");
+    let mut daemon = plant.daemon();
+    let confirmed = daemon.wait_for(r#""event":"stop_confirmed""#);
+    assert!(confirmed.contains("\"south\"") && confirmed.contains("stop_of_before"), "{confirmed}");
+    let (code, last) = daemon.interrupt();
+    assert_eq!(code, Some(1), "the other turns on, which is an alarm: {last}");
+    let [one, other] = ["atv312@1", "atv312@2"].map(|drive| plant.sim.on(drive, &["status"]).out);
+    assert!(!one.contains("running"), "{one}");
+    assert!(other.contains("running"), "{other}");
+    assert_eq!(plant.kept().trim(), "{}", "it was seen to stand");
+}
+
+#[test]
+fn a_stop_that_was_not_confirmed_of_a_drive_that_is_in_the_file_no_more_is_given_once_it_is_there_again() {
+    let plant = with_a_stop_pending("kept-taken-out");
+    let text = fs::read_to_string(plant.file.path()).expect("it is there");
+    fs::write(plant.file.path(), text.replace(&table("atv312@1", "north"), "")).expect("it can be written");
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"identified""#);
+    assert!(plant.kept().contains(r#""stop": "ramp""#), "{}", plant.kept());
+    fs::write(plant.file.path(), text.replace("\"north\"", "\"east\"")).expect("it can be written");
+    daemon.signal("-HUP");
+    let confirmed = daemon.wait_for(r#""event":"stop_confirmed""#);
+    assert!(confirmed.contains("\"east\"") && confirmed.contains("stop_of_before"), "{confirmed}");
+    daemon.interrupt();
+    let [one, other] = ["atv312@1", "atv312@2"].map(|drive| plant.sim.on(drive, &["status"]).out);
+    assert!(!one.contains("running"), "{one}");
+    assert!(other.contains("running"), "{other}");
 }
 
 #[test]
@@ -304,9 +368,16 @@ fn what_a_run_leaves_in_its_state_folder_is_what_the_readme_lists() {
     let unlisted: Vec<_> = left.iter().filter(|name| !is_listed(name)).collect();
     assert!(unlisted.is_empty(), "{unlisted:?} of {left:?}, {listed:?}");
     // What this run keeps in any case; the rest are of faces and commands that it has not.
-    for kept in
-        ["tokens", "audit", "runs.json", "watched.json", "names.json", "alarms.json", "history.sqlite"]
-    {
+    for kept in [
+        "ballast",
+        "tokens",
+        "audit",
+        "runs.json",
+        "watched.json",
+        "names.json",
+        "alarms.json",
+        "history.sqlite",
+    ] {
         assert!(left.iter().any(|name| name == kept), "{kept}: {left:?}");
     }
 }

@@ -221,6 +221,23 @@ impl Alarms {
         }
     }
 
+    /// Each drive is called now as this says of its name of before, all at once, for two may have exchanged their names.
+    pub fn rename_all(&mut self, names: &BTreeMap<String, String>) {
+        let renamed = |alarm: &Alarm| names.get(alarm.drive.as_deref()?).cloned();
+        let (moved, mut stay): (Vec<Alarm>, Vec<Alarm>) =
+            self.alarms.drain(..).partition(|alarm| renamed(alarm).is_some());
+        let moved: Vec<Alarm> =
+            moved.into_iter().map(|alarm| Alarm { drive: renamed(&alarm), ..alarm }).collect();
+        let is_same = |one: &Alarm, other: &Alarm| {
+            one.drive.is_some()
+                && (&one.drive, one.kind, &one.mark) == (&other.drive, other.kind, &other.mark)
+        };
+        stay.retain(|alarm| !moved.iter().any(|other| is_same(alarm, other)));
+        self.alarms = moved;
+        self.alarms.append(&mut stay);
+        self.alarms.sort_by_key(|alarm| alarm.id);
+    }
+
     fn of_drive<'a>(&'a self, drive: &'a str) -> impl Iterator<Item = &'a Alarm> {
         self.alarms.iter().filter(move |alarm| alarm.drive.as_deref() == Some(drive))
     }

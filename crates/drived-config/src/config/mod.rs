@@ -27,6 +27,7 @@ pub use self::{
     table::{Entry, Key, Said, Tells, settings, shown, within},
     values::{NotAmong, Parsed, words},
 };
+use crate::places::place;
 use drived_words::drive_spec::DriveName;
 
 /// The keys of a drive.
@@ -76,7 +77,7 @@ pub fn of<T>(said: &Option<Spanned<T>>) -> Option<&T> {
 /// Adds a drive of a line, of which a run before has left this.
 pub fn add(builder: FleetBuilder, line: &LinePart, drive: &DrivePart, left: Left) -> FleetBuilder {
     let DrivePart { name, settings, options, .. } = drive;
-    let settings = settings.clone().after(left);
+    let settings = settings.clone().at(place(&line.config.endpoint, *name)).after(left);
     builder.drive(&line.name, name.slave.number(), settings, |port, slave| {
         name.family.open_with(port, slave, options)
     })

@@ -7,6 +7,7 @@
 
 mod digest;
 mod folder;
+mod secure;
 
 use std::{
     ffi::{CStr, OsStr, OsString},
@@ -28,7 +29,10 @@ use rustix::{
     process::geteuid,
 };
 
-pub use self::digest::{digits, sha256};
+pub use self::{
+    digest::{digits, sha256},
+    secure::{BALLAST, Stale, Unwritten, lay_ballast},
+};
 
 /// Who may read what is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,13 +103,17 @@ impl Kept {
     /// # Errors
     /// It cannot be read, is no file or far too long, or is a link: then the error says what to name instead.
     pub fn read(&self) -> io::Result<Option<(Vec<u8>, Stamp)>> {
+        self.read_up_to(LONGEST)
+    }
+
+    fn read_up_to(&self, longest: u64) -> io::Result<Option<(Vec<u8>, Stamp)>> {
         let Some(file) = self.open()? else { return Ok(None) };
         let stamp = stamp(&file)?;
         let mut content = Vec::new();
-        let mut file = file.take(LONGEST + 1);
+        let mut file = file.take(longest + 1);
         file.read_to_end(&mut content)?;
         match file.limit() {
-            0 => Err(io::Error::other(format!("it is longer than {} KiB", LONGEST >> 10))),
+            0 => Err(io::Error::other(format!("it is longer than {} KiB", longest >> 10))),
             _ => Ok(Some((content, stamp))),
         }
     }
@@ -165,10 +173,17 @@ impl Kept {
             Readers::Others => Mode::from_raw_mode(0o666),
         };
         let mut file = File::from(openat(&folder, &new, flags, mode)?);
-        give_to_owner_of(&folder, &file)?;
-        file.write_all(content)?;
-        file.sync_all()?;
-        renameat(&folder, &new, &folder, &self.name)?;
+        let mut write = || {
+            give_to_owner_of(&folder, &file)?;
+            file.write_all(content)?;
+            file.sync_all()?;
+            Ok(renameat(&folder, &new, &folder, &self.name)?)
+        };
+        if let Err(error) = write() {
+            // Half of it would keep room that others need.
+            let _ = unlinkat(&folder, &new, AtFlags::empty());
+            return Err(error);
+        }
         // A disk that cannot write a folder has written the file.
         let _ = folder::itself(&folder).map(fsync);
         Ok(())

@@ -6,6 +6,7 @@ mod exit;
 mod faces;
 mod here;
 mod json;
+mod kept;
 mod notify;
 mod own;
 mod picture;
@@ -35,8 +36,10 @@ use self::{
 };
 use drived_config::{
     config::{Group, LinePart, add},
+    kept::{BALLAST, lay_ballast},
     names::{self, Names, PLACES, Told},
-    records::{self, Records, in_folder},
+    places::{Places, place},
+    records,
     rights::Caller,
 };
 use drived_doors::{
@@ -47,7 +50,7 @@ use drived_doors::{
     },
 };
 use drived_face::Surroundings;
-use drived_file::{Config, ledger};
+use drived_file::Config;
 use drived_http::{
     api::{self, setup::Setup as _},
     metrics, page,
@@ -107,23 +110,23 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let mut wishes = Wishes::listen()?;
     let lines = start_lines(&config)?;
     let state = &config.doors.state;
-    let watchdogs = Records::open(state.watchdogs.as_deref(), watchdogs::LOSS);
-    let started = Records::open(in_folder(state.folder.as_deref(), runs::FILE).as_deref(), runs::LOSS);
-    let eeproms = Records::open(in_folder(state.folder.as_deref(), ledger::FILE).as_deref(), ledger::LOSS);
-    let before = |drive: &str| Left {
-        identity: None,
-        watchdog: watchdogs.of(drive).cloned(),
-        run: started.of(drive).cloned(),
-        eeprom: eeproms.of(drive).cloned(),
-    };
+    let folder = state.folder.as_deref();
+    if let Some(folder) = folder
+        && let Err(error) = lay_ballast(folder)
+    {
+        tracing::warn!(
+            "{}: {error}: on a full disk there is no room for the stops that are not confirmed",
+            folder.join(BALLAST).display()
+        );
+    }
+    let places = Places::of(&config.lines).after(names::places_before(folder));
+    let kept = kept::Kept::open(state, &places);
     let (tell_runs, told_runs) = mpsc::unbounded_channel();
-    let builder = build(&config, &lines, before).keep_runs(tell_runs);
+    let builder = build(&config, &lines, |place| kept.of(place)).keep_runs(tell_runs);
     let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
     // Nobody is watched any more for a run that was ended.
-    let watched = Watched::in_folder(state.folder.as_deref(), |drive| {
-        started.of(drive).is_some_and(|run| run.lease.is_some())
-    });
-    let kept = runs::follow(started, told_runs);
+    let watched = Watched::in_folder(folder, &places, |place| kept.runs(place));
+    let runs = runs::follow(kept.runs.clone(), told_runs);
     // Whatever else shows the fleet to somebody takes a handle of it and a reader of its events, as this does.
     let with_table = !args.json && logging::may_be_shown();
     let form = match with_table {
@@ -133,13 +136,13 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     };
     let mut report = Report::start(fleet.clone(), fleet.events(), config.snapshots, form);
     let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
-    let watchdogs = records::follow(watchdogs, fleet.events(), watchdogs::note);
-    let eeproms = records::follow(eeproms, fleet.events(), eeprom::note);
+    let watchdogs = records::follow(kept.watchdogs.clone(), fleet.events(), watchdogs::note);
+    let eeproms = records::follow(kept.eeproms.clone(), fleet.events(), eeprom::note);
     let findings = tokio::spawn(findings::follow(fleet.clone()));
     // Before anything is kept by which a later start sees that there was this one.
     let names = Names::in_folder(config.doors.state.folder.as_deref());
     tell_names(&names, &config.lines, &config.groups);
-    let alarms = KeptAlarms::in_folder(state.folder.as_deref());
+    let alarms = KeptAlarms::in_folder(folder, &places);
     let plant = Plant::start_with(fleet.clone(), config.groups.clone(), false, &alarms, watched);
     plant.set_names(names.clone());
     let watched = plant.keep_watched();
@@ -161,7 +164,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let shutdown = config.shutdown;
     let beginning = config.lines.is_empty().then(|| args.config.clone());
     let reloader =
-        Reloader::new(plant.clone(), notify.clone(), names, faces.clone(), opened, args.config, config);
+        Reloader::new(plant.clone(), notify.clone(), names, faces.clone(), opened, kept, args.config, config);
     let first_hour = setup::Desk::new(reloader.clone());
     let router = api::router(plant.clone())
         .merge(api::reload_router(reloader.clone()))
@@ -222,7 +225,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let _ = journal.await;
     let _ = watchdogs.await;
     let _ = eeproms.await;
-    let _ = tokio::time::timeout(AUDITED_WITHIN, kept).await;
+    let _ = tokio::time::timeout(AUDITED_WITHIN, runs).await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, alarms).await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, by_profile).await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, audited).await;
@@ -329,14 +332,14 @@ fn start_lines(config: &Config) -> Result<Vec<Line>, Failure> {
     lines.map_err(|error| Failure::Input(error.to_string()))
 }
 
-fn build(config: &Config, lines: &[Line], before: impl Fn(&str) -> Left) -> FleetBuilder {
+/// By what a run before has left of the drive at each place.
+fn build(config: &Config, lines: &[Line], left: impl Fn(&str) -> Left) -> FleetBuilder {
     let mut builder = Fleet::builder();
     for (part, line) in config.lines.iter().zip(lines) {
         builder = builder.line_with(&*part.name, line.clone(), |_| part.budget);
-        builder = part
-            .drives
-            .iter()
-            .fold(builder, |builder, drive| add(builder, part, drive, before(&drive.settings.name)));
+        builder = part.drives.iter().fold(builder, |builder, drive| {
+            add(builder, part, drive, left(&place(&part.config.endpoint, drive.name)))
+        });
     }
     builder
 }

@@ -20,12 +20,14 @@ use self::changes::{Change, changes};
 use super::{
     faces::{self, Faces},
     here::{self, Here},
+    kept::Kept,
     notify::Notify,
     profiles::Opened,
 };
 use drived_config::{
     config::{DrivePart, add},
     names::Names,
+    places::{place, places},
 };
 use drived_file::{Config, is_one_wire};
 use drived_http::api::Reload;
@@ -33,7 +35,7 @@ use drived_plant::{
     counts::{Id, Samples, Source},
     plant::{Plant, views::NoticeView, watched::Watch},
 };
-use drived_words::{drive_spec::DriveName, failure::Failure, json::unix};
+use drived_words::{failure::Failure, json::unix};
 
 /// Whoever has asked for a reload hears within this time what it waits for: it goes on for as long as the exit may take (`shutdown`), and
 /// his door for no longer than forty seconds.
@@ -49,6 +51,7 @@ struct Inner {
     names: Names,
     faces: Faces,
     opened: Opened,
+    kept: Kept,
     file: PathBuf,
     /// What holds now.
     config: Mutex<Config>,
@@ -78,6 +81,7 @@ impl Reloader {
         names: Names,
         faces: Faces,
         opened: Opened,
+        kept: Kept,
         file: PathBuf,
         config: Config,
     ) -> Self {
@@ -88,6 +92,7 @@ impl Reloader {
             names,
             faces,
             opened,
+            kept,
             file,
             config: Mutex::new(config),
             last,
@@ -136,7 +141,7 @@ impl Reloader {
             faces::prepare(&new, |table| changes.iter().any(|change| change.opened_face() == Some(table)))?;
         let leaving: Vec<&str> = changes.iter().filter_map(Change::removed_drive).collect();
         let handle = |(name, place)| fleet.drive(name).map(|handle| (place, handle));
-        let gone = places(config).filter(|(name, _)| leaving.contains(name)).filter_map(handle);
+        let gone = places(&config.lines).filter(|(name, _)| leaving.contains(name)).filter_map(handle);
         let gone: Vec<_> = gone.collect();
         self.leave(leaving.iter().map(ToString::to_string).collect());
         let actions = fleet.remove(&leaving, config.shutdown).await;
@@ -167,7 +172,7 @@ impl Reloader {
         super::tell_names(&self.0.names, &new.lines, &config.groups);
         // Nobody asks for a drive that is not there yet.
         plant.set_options(super::options(&new.lines));
-        let made = add_all(plant, &changes, &new, &lines, &mut leavings)
+        let made = add_all(plant, &changes, &new, &lines, &mut leavings, &self.0.kept)
             .map(|()| settle(plant, config, &mut new, &changes));
         *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner) = leavings;
         // Also where nothing has changed: what is kept may have been mended.
@@ -428,6 +433,7 @@ fn add_all(
     new: &Config,
     lines: &[(String, LineBudget, Line)],
     leavings: &mut Leavings,
+    kept: &Kept,
 ) -> Result<(), FleetError> {
     plant.fleet().extend(|mut builder| {
         for (name, budget, line) in lines {
@@ -438,8 +444,8 @@ fn add_all(
                 changes.iter().any(|change| change.added_drive() == Some(&*drive.settings.name))
             };
             builder = part.drives.iter().filter(is_added).fold(builder, |builder, drive| {
-                let left = taken(leavings, plant, new, &drive.settings.name);
-                add(builder, part, drive, left)
+                let place = place(&part.config.endpoint, drive.name);
+                add(builder, part, drive, taken(leavings, kept, plant, &place, &drive.settings.name))
             });
         }
         // The file was planned as a whole.
@@ -510,28 +516,16 @@ impl Source for Reloader {
     }
 }
 
-/// Where a drive is, whatever it and its line are called: its port, its address and its family.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Place(Endpoint, DriveName);
-
-/// The places of the drives of a configuration, by their names.
-fn places(config: &Config) -> impl Iterator<Item = (&str, Place)> {
-    config.lines.iter().flat_map(|line| {
-        let place = |drive: &DrivePart| Place(line.config.endpoint.clone(), drive.name);
-        line.drives.iter().map(move |drive| (drive.settings.name.as_str(), place(drive)))
-    })
-}
-
 /// What is left of a drive that is not in the fleet any more.
 struct Leaving {
-    place: Place,
+    place: String,
     left: Left,
     /// Over who has started its motor, where that was left turning.
     watch: Option<Watch>,
 }
 
 impl Leaving {
-    fn of(plant: &Plant, place: Place, drive: &DriveHandle) -> Self {
+    fn of(plant: &Plant, place: String, drive: &DriveHandle) -> Self {
         let (left, watch) = (drive.left(), plant.watched().take(drive.name()));
         let watch = watch.filter(|_| left.run.as_ref().is_some_and(|run| run.lease.is_some()));
         Self { place, left, watch }
@@ -541,12 +535,14 @@ impl Leaving {
 /// What is left of drives that are not in the fleet any more, for when they are taken up again, by whatever name.
 type Leavings = Vec<Leaving>;
 
-/// Takes what is left of a drive.
-fn taken(leavings: &mut Leavings, plant: &Plant, config: &Config, name: &str) -> Left {
-    let place = places(config).find_map(|(other, place)| (other == name).then_some(place));
-    let at = leavings.iter().position(|leaving| Some(&leaving.place) == place.as_ref());
+/// Takes what is left of the drive at a place, which is called so now: by this run, or by one before it, in whose configuration it was.
+fn taken(leavings: &mut Leavings, kept: &Kept, plant: &Plant, place: &str, name: &str) -> Left {
+    let at = leavings.iter().position(|leaving| leaving.place == place);
     let Some(Leaving { left, watch, .. }) = at.map(|at| leavings.swap_remove(at)) else {
-        return Left::default();
+        if kept.runs(place) {
+            plant.watched().put_kept(place, name);
+        }
+        return kept.of(place);
     };
     if let Some(watch) = watch {
         plant.watched().put(name, watch);

@@ -1,20 +1,18 @@
 //! What each watchdog was before this program armed it, kept beyond the life of the program: one that is killed puts
 //! nothing back, and the next finds the drive armed.
 
-use drive_fleet::{EventKind, WatchdogBefore};
+use drive_fleet::{Event, EventKind, WatchdogBefore};
 
 use drived_config::records::Records;
 
-/// What is not so where they cannot be kept.
-pub(super) const LOSS: &str = "watchdogs that an earlier run, or one that is killed, has armed stay armed";
-
 /// Notes what has happened. Gives whether the file is another now.
-pub(super) fn note(records: &mut Records<WatchdogBefore>, drive: &str, kind: &EventKind) -> bool {
+pub(super) fn note(records: &Records<WatchdogBefore>, event: &Event) -> bool {
+    let Event { drive, place, kind, .. } = event;
     match kind {
         EventKind::WatchdogVerified { before: Some(before), .. } => {
-            records.set(drive, Some(WatchdogBefore::clone(before)))
+            records.set(place, drive, Some(WatchdogBefore::clone(before)))
         }
-        EventKind::WatchdogRestored(_) | EventKind::IdentityChanged { .. } => records.set(drive, None),
+        EventKind::WatchdogRestored(_) | EventKind::IdentityChanged { .. } => records.set(place, drive, None),
         _ => false,
     }
 }
@@ -24,6 +22,8 @@ mod tests {
     use std::{sync::Arc, time::Duration};
 
     use drive_core::{Reaction, Watchdog};
+    use drive_fleet::Cause;
+    use drived_config::places::Places;
 
     use super::*;
 
@@ -40,10 +40,11 @@ mod tests {
             written: true,
             before: Some(Arc::new(before.clone())),
         };
-        let mut records = Records::open(None, LOSS);
-        assert!(note(&mut records, "pump 1", &verified) && !note(&mut records, "pump 1", &verified));
-        assert_eq!(records.of("pump 1"), Some(&before));
-        assert!(note(&mut records, "pump 1", &EventKind::WatchdogRestored(armed(10))));
+        let event = |kind| Event::now("pump 1", kind, Cause::Drive);
+        let records = Records::open(None, &Places::default());
+        assert!(note(&records, &event(verified.clone())) && !note(&records, &event(verified)));
+        assert_eq!(records.of("pump 1"), Some(before));
+        assert!(note(&records, &event(EventKind::WatchdogRestored(armed(10)))));
         assert_eq!(records.of("pump 1"), None);
     }
 }

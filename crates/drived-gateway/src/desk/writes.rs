@@ -328,7 +328,7 @@ impl Desk {
                 ));
             }
         };
-        self.plant.watched().start(watched(&self.config), peer, drive.name()).await;
+        self.plant.watched().start(watched(&self.config), peer, drive).await;
         self.order_asked_after(caller, drive, action, (arrived, asked_after), deadline).await
     }
 

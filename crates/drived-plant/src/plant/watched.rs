@@ -3,7 +3,6 @@
 
 use std::{
     collections::BTreeMap,
-    io,
     net::{IpAddr, SocketAddr},
     path::Path,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -25,15 +24,14 @@ use super::{
     revisions::Subject,
 };
 use drived_config::{
-    kept::{Kept, Readers},
+    places::Places,
+    records::{Record, Records, in_folder},
     rights::{Caller, Role},
 };
 use drived_words::json::unix;
 
 /// The file of the state folder.
 const FILE: &str = "watched.json";
-/// What is not so where they cannot be kept.
-const LOSS: &str = "after a kill no motor is stopped for the silence of who has started it";
 /// How long a start waits at the most until it is kept who has to be heard: a disk that hangs holds up no pump for ever.
 const KEPT_WITHIN: Duration = Duration::from_millis(400);
 /// A start waits no longer than a client has patience, a minute at the most: a motor that stands then was not started.
@@ -63,6 +61,14 @@ struct Starter {
     stops: bool,
 }
 
+impl Record for Starter {
+    const LOSS: &'static str = "no motor is stopped for the silence of who has started it before now";
+
+    fn alone(&self) -> &'static str {
+        "it is not stopped for the silence of who has started it"
+    }
+}
+
 impl Starter {
     const fn limit(&self) -> Duration {
         Duration::from_millis(self.limit_ms)
@@ -72,6 +78,8 @@ impl Starter {
 /// The watch over who has started a drive.
 #[derive(Debug, Clone)]
 pub struct Watch {
+    /// Where the drive is.
+    place: Arc<str>,
     starter: Starter,
     /// Since when he is watched by this program.
     began: Instant,
@@ -80,6 +88,13 @@ pub struct Watch {
     is_told: bool,
     /// His run was to be stopped since: whoever starts the motor behind that starts another one.
     is_stopped: bool,
+}
+
+impl Watch {
+    fn begin(place: Arc<str>, starter: Starter) -> Self {
+        let now = Instant::now();
+        Self { place, starter, began: now, heard: now, is_told: false, is_stopped: false }
+    }
 }
 
 /// Somebody who has been silent for too long.
@@ -91,7 +106,7 @@ struct Silent {
 /// Who has to be heard, by the name of the drive that he has started last.
 #[derive(Debug)]
 pub struct Watched {
-    file: Option<Kept>,
+    kept: Option<Records<Starter>>,
     drives: Mutex<BTreeMap<String, Watch>>,
     /// How often that has changed which is kept, and up to which change it is in the file.
     changed: watch::Sender<u64>,
@@ -101,7 +116,7 @@ pub struct Watched {
 impl Default for Watched {
     fn default() -> Self {
         Self {
-            file: None,
+            kept: None,
             drives: Mutex::default(),
             changed: watch::Sender::new(0),
             written: watch::Sender::new(0),
@@ -112,20 +127,13 @@ impl Default for Watched {
 impl Watched {
     /// Those of this state folder whose runs were not ended; without one they live as long as the program. They count as silent from
     /// now on, until they are heard.
-    pub fn in_folder(folder: Option<&Path>, runs: impl Fn(&str) -> bool) -> Self {
-        let file = folder.map(|folder| Kept::at(&folder.join(FILE)));
-        let read = file.as_ref().map_or(Ok(BTreeMap::new()), read);
-        let kept = read.unwrap_or_else(|error| {
-            tracing::error!(
-                "watched.json: {error}: no motor is stopped for the silence of who has started it before now"
-            );
-            BTreeMap::new()
-        });
-        let now = Instant::now();
-        let watch = |starter| Watch { starter, began: now, heard: now, is_told: false, is_stopped: false };
-        let kept = kept.into_iter().filter(|(drive, _)| runs(drive));
-        let drives = kept.map(|(drive, starter)| (drive, watch(starter))).collect();
-        Self { file, drives: Mutex::new(drives), ..Self::default() }
+    pub fn in_folder(folder: Option<&Path>, places: &Places, runs: impl Fn(&str) -> bool) -> Self {
+        let Some(file) = in_folder(folder, FILE) else { return Self::default() };
+        let kept = Records::<Starter>::open(Some(&file), places);
+        let all = kept.all().into_iter().filter(|(place, ..)| runs(place));
+        let drives =
+            all.map(|(place, drive, starter)| (drive, Watch::begin(Arc::from(place), starter))).collect();
+        Self { kept: Some(kept), drives: Mutex::new(drives), ..Self::default() }
     }
 
     /// These are the doors from now on. Who came by one of them, by its address or by its name, is watched as it says, and has its whole
@@ -159,8 +167,8 @@ impl Watched {
     }
 
     /// A client is about to start a drive by a door. It is kept when this ends, or cannot be soon.
-    pub async fn start(&self, door: WatchedDoor<'_>, client: IpAddr, drive: &str) {
-        let now = Instant::now();
+    pub async fn start(&self, door: WatchedDoor<'_>, client: IpAddr, drive: &DriveHandle) {
+        let name: &str = drive.name();
         let starter = door.limit.map(|limit| Starter {
             door: door.name.to_owned(),
             listen: door.listen,
@@ -172,18 +180,17 @@ impl Watched {
             let mut drives = self.lock();
             let before = match starter.clone() {
                 Some(starter) => {
-                    let watch = Watch { starter, began: now, heard: now, is_told: false, is_stopped: false };
-                    drives.insert(drive.to_owned(), watch)
+                    drives.insert(name.to_owned(), Watch::begin(Arc::clone(drive.place()), starter))
                 }
                 // Whoever starts it now needs not be heard.
-                None => drives.remove(drive),
+                None => drives.remove(name),
             };
             if before.map(|before| before.starter) == starter {
                 return;
             }
             (self.written.subscribe(), self.change())
         };
-        if self.file.is_some() {
+        if self.kept.is_some() {
             // A file that is not written holds up nothing.
             let _ = timeout(KEPT_WITHIN, is_kept.wait_for(|written| *written >= change)).await;
         }
@@ -236,6 +243,15 @@ impl Watched {
         self.change();
     }
 
+    /// A drive comes whose motor an earlier run has left turning: whoever had to be heard then has to be heard now.
+    pub fn put_kept(&self, place: &str, drive: &str) {
+        let Some(kept) = &self.kept else { return };
+        kept.call(place, drive);
+        if let Some(starter) = kept.of(place) {
+            self.put(drive, Watch::begin(Arc::from(place), starter));
+        }
+    }
+
     /// Who is silent and has not been told yet. Who has started nothing that still runs is forgotten.
     fn look(&self, now: Instant, find: impl Fn(&str) -> Option<DriveHandle>) -> Vec<Silent> {
         let (mut silent, mut is_less) = (Vec::new(), false);
@@ -283,13 +299,6 @@ fn milliseconds(limit: Duration) -> u64 {
     u64::try_from(limit.as_millis()).unwrap_or(u64::MAX)
 }
 
-fn read(file: &Kept) -> io::Result<BTreeMap<String, Starter>> {
-    match file.read()? {
-        Some((text, _)) => Ok(serde_json::from_slice(&text)?),
-        None => Ok(BTreeMap::new()),
-    }
-}
-
 impl Plant {
     /// Who has to be heard.
     pub fn watched(&self) -> &Watched {
@@ -303,25 +312,21 @@ impl Plant {
         // What was left out of the file's is left out there, too.
         changed.mark_changed();
         tokio::spawn(async move {
-            let mut is_failing = false;
             while changed.changed().await.is_ok() {
                 let Some(inner) = plant.upgrade() else { return };
-                let Some(file) = inner.watched.file.clone() else { return };
-                let (change, all) = {
+                let Some(kept) = inner.watched.kept.clone() else { return };
+                let change = {
                     let drives = inner.watched.lock();
-                    let starter = |(drive, watch): (&String, &Watch)| (drive.clone(), watch.starter.clone());
-                    (*changed.borrow_and_update(), drives.iter().map(starter).collect::<BTreeMap<_, _>>())
+                    let starter = |(drive, watch): (&String, &Watch)| {
+                        (watch.place.to_string(), drive.clone(), watch.starter.clone())
+                    };
+                    kept.set_all(drives.iter().map(starter));
+                    *changed.borrow_and_update()
                 };
                 drop(inner);
-                let place = file.path().display().to_string();
-                let write = move || file.replace(&serde_json::to_vec_pretty(&all)?, Readers::Owner);
-                let Ok(written) = spawn_blocking(write).await else { return };
-                if let (Err(error), false) = (&written, is_failing) {
-                    tracing::warn!("{place}: {error}: {LOSS}");
-                }
-                is_failing = written.is_err();
+                let Ok(is_written) = spawn_blocking(move || kept.write()).await else { return };
                 let Some(inner) = plant.upgrade() else { return };
-                if !is_failing {
+                if is_written {
                     inner.watched.written.send_replace(change);
                 }
             }
@@ -386,7 +391,9 @@ mod tests {
     async fn who_is_watched_is_kept_before_a_start_and_known_after_a_kill_where_the_run_was_not_ended() {
         let (folder, test) = (Folder::new("watched"), TestPlant::of(1).await);
         let place = folder.file("");
-        let open = |runs: bool| Watched::in_folder(Some(&place), move |_| runs);
+        let pump = test.plant.fleet().drive("pump 1").unwrap();
+        let there: Places = [("pump 1".to_owned(), pump.place().to_string())].into_iter().collect();
+        let open = |runs: bool| Watched::in_folder(Some(&place), &there, move |_| runs);
         let known = |watched: &Watched| watched.lock().keys().cloned().collect::<Vec<_>>();
         let kept = KeptAlarms::default();
         let plant = Plant::start_with(test.plant.fleet(), Vec::new(), false, &kept, open(true));
@@ -398,11 +405,11 @@ mod tests {
             stops: true,
         };
         let client = "10.0.0.7".parse().unwrap();
-        plant.watched().start(door(Some(Duration::from_secs(4))), client, "pump 1").await;
+        plant.watched().start(door(Some(Duration::from_secs(4))), client, &pump).await;
         assert_eq!(known(&open(true)), ["pump 1"]);
         assert!(known(&open(false)).is_empty());
         // Whoever starts it by a door where nobody has to be heard is not watched.
-        plant.watched().start(door(None), client, "pump 1").await;
+        plant.watched().start(door(None), client, &pump).await;
         assert!(known(&open(true)).is_empty());
         keeping.abort();
         fs::write(folder.file(FILE), "{\"pump 1\":{").unwrap();

@@ -152,7 +152,7 @@ fn say(table: &Table) -> Result<(), Failure> {
 /// What is kept cannot be read.
 pub(crate) fn numbered(config: &Config) -> Result<Table, Failure> {
     let mut table = match &config.doors.state.folder {
-        Some(folder) => names::read(&Kept::at(&names::place(folder))).map_err(Failure::Input)?,
+        Some(folder) => names::read(&Kept::at(&names::file_in(folder))).map_err(Failure::Input)?,
         None => Table::default(),
     };
     table.take_up(&configured(config));
@@ -178,5 +178,5 @@ fn file(config: &Config) -> Result<Kept, Failure> {
             "no state folder keeps numbers: name one in the configuration, state = \"FOLDER\"".to_owned(),
         )
     })?;
-    Ok(Kept::at(&names::place(folder)))
+    Ok(Kept::at(&names::file_in(folder)))
 }

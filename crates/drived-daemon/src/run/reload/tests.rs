@@ -8,7 +8,7 @@ use http_body_util::BodyExt as _;
 use tower::ServiceExt as _;
 
 use super::*;
-use drived_config::names::Names;
+use drived_config::{config::State, names::Names, places::Places};
 use drived_doors::{Caller, Rights, audit::Audit};
 use drived_face::Surroundings;
 
@@ -92,8 +92,9 @@ fn begun_with(file: &std::path::Path, config: Config, lines: &[Line]) -> (Fleet,
     let around = Surroundings::new(plant.clone(), Audit::default(), Names::default());
     let faces = Faces::open(Vec::new(), around);
     let opened = Opened::default();
-    let reloader =
-        Reloader::new(plant, Notify::start(), Names::default(), faces, opened, file.to_owned(), config);
+    let kept = Kept::open(&State::default(), &Places::default());
+    let (notify, file) = (Notify::start(), file.to_owned());
+    let reloader = Reloader::new(plant, notify, Names::default(), faces, opened, kept, file, config);
     (fleet, reloader)
 }
 

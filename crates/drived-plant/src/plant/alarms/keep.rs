@@ -1,33 +1,41 @@
 //! The alarms in a file of the state folder, so that none goes away with the program.
 
 use std::{
-    io::{self, Read as _},
+    collections::BTreeMap,
+    io,
     path::Path,
     sync::{Arc, Weak},
 };
 
-use drive_fleet::alarms::Alarms;
+use drive_fleet::alarms::{Alarm, Alarms};
 use serde::{Deserialize, Serialize};
 use tokio::task::{JoinHandle, spawn_blocking};
 
 use super::super::{Inner, Plant};
-use drived_config::kept::{Kept, Readers};
+use drived_config::{
+    kept::{Kept, Stale, Unwritten},
+    places::Places,
+};
 
 /// The form in which they are written.
 const SCHEMA: u32 = 1;
-/// What is longer is nothing that was kept: a thousand drives with ten alarms each have a third of it.
-const LONGEST: u64 = 16 << 20;
 /// The file of the state folder.
 const FILE: &str = "alarms.json";
-/// What is said where they cannot be kept.
-const LOSS: &str = "a restart forgets which alarms were acknowledged";
+/// What is so where they cannot be read, or could not be written.
+const LOSS: &str =
+    "nobody knows which alarms there were and which were acknowledged; what is wrong then becomes one anew";
 
 /// The alarms that were kept, and where.
 #[derive(Debug, Clone, Default)]
 pub struct KeptAlarms {
     file: Option<Kept>,
     pub(super) alarms: Alarms,
+    /// Where the drives of the alarms are.
+    places: DrivePlaces,
 }
+
+/// By the names of the drives.
+type DrivePlaces = BTreeMap<String, String>;
 
 /// As it stands in the file.
 #[derive(Serialize, Deserialize)]
@@ -35,35 +43,59 @@ pub struct KeptAlarms {
 struct Written {
     schema: u32,
     alarms: Alarms,
+    /// A version before this one has kept none.
+    #[serde(default)]
+    places: DrivePlaces,
 }
 
 impl KeptAlarms {
-    /// Those of this state folder; without one they live as long as the program. What cannot be read is told and put aside, where it can
+    /// Those of this state folder; without one they live as long as the program. An alarm is of a machine: whoever is where its drive was has
+    /// it, and that of a drive whose name another has now says where it was. What cannot be read is told and put aside, where it can
     /// be looked at: what is wrong now becomes an alarm anew.
-    pub fn in_folder(folder: Option<&Path>) -> Self {
+    pub fn in_folder(folder: Option<&Path>, there: &Places) -> Self {
         let Some(file) = folder.map(|folder| Kept::at(&folder.join(FILE))) else { return Self::default() };
-        let alarms = read(&file).unwrap_or_else(|error| {
+        let (mut alarms, places) = read(&file).unwrap_or_else(|error| {
             let aside = file.beside(".damaged");
             let is_aside = file.rename(&aside).unwrap_or_default();
             let place =
                 if is_aside { format!(", it is in {} now", aside.path().display()) } else { String::new() };
-            tracing::error!(
-                "{}: {error}{place}: nobody knows which alarms were acknowledged",
-                file.path().display()
-            );
-            Alarms::default()
+            tracing::error!("{}: {error}{place}: {LOSS}", file.path().display());
+            (Alarms::default(), DrivePlaces::new())
         });
-        Self { file: Some(file), alarms }
+        let names = names(&alarms, &places, there);
+        alarms.rename_all(&names);
+        let places = places.into_iter().map(|(name, place)| match names.get(&name) {
+            Some(now) => (now.clone(), place),
+            None => (name, place),
+        });
+        Self { file: Some(file), alarms, places: places.collect() }
     }
 }
 
-fn read(file: &Kept) -> io::Result<Alarms> {
-    let Some(open) = file.open()? else { return Ok(Alarms::default()) };
-    let mut content = Vec::new();
-    open.take(LONGEST).read_to_end(&mut content)?;
-    let Written { schema, alarms } = serde_json::from_slice(&content)?;
+/// What the drives of these alarms are called now, by the names that they had, where these are others.
+fn names(alarms: &Alarms, places: &DrivePlaces, there: &Places) -> BTreeMap<String, String> {
+    let of_motion = |name: &str| {
+        let of_drive = |alarm: &&Alarm| alarm.drive.as_deref() == Some(name);
+        alarms.all().iter().filter(of_drive).any(|alarm| alarm.kind.is_of_motion())
+    };
+    let now = |(name, place): (&String, &String)| {
+        // Such an alarm goes with the stop.
+        let now = there.now(name, Some(place), of_motion(name)).and_then(|place| there.name_at(place));
+        let now = match now {
+            Some(now) => now.to_owned(),
+            None if there.has(name) => format!("{name} at {place}"),
+            None => return None,
+        };
+        (now != *name).then(|| (name.clone(), now))
+    };
+    places.iter().filter_map(now).collect()
+}
+
+fn read(file: &Kept) -> io::Result<(Alarms, DrivePlaces)> {
+    let Some(content) = file.read_secured()? else { return Ok(Default::default()) };
+    let Written { schema, alarms, places } = serde_json::from_slice(&content)?;
     match schema {
-        SCHEMA => Ok(alarms),
+        SCHEMA => Ok((alarms, places)),
         other => Err(io::Error::other(format!("it is written in form {other}, and {SCHEMA} is known here"))),
     }
 }
@@ -75,14 +107,14 @@ impl Plant {
         let (changed, closed) = (self.0.alarms.changed.subscribe(), self.0.alarms.is_closed.subscribe());
         tokio::spawn(async move {
             let (mut changed, mut closed) = (changed, closed);
-            let Some(file) = kept.file else { return };
+            let KeptAlarms { file: Some(file), mut places, .. } = kept else { return };
             let mut is_failing = false;
             loop {
                 let is_last = *closed.borrow_and_update();
                 changed.mark_unchanged();
-                let Some(written) = write(&plant, &file).await else { return };
+                let Some(written) = write(&plant, &file, &mut places).await else { return };
                 if let (Err(error), false) = (&written, is_failing) {
-                    tracing::warn!("{}: {error}: {LOSS}", file.path().display());
+                    tracing::error!("{}: {error} {LOSS}", file.path().display());
                 }
                 is_failing = written.is_err();
                 if is_last {
@@ -97,13 +129,21 @@ impl Plant {
     }
 }
 
-/// Writes them as they are; `None`: the plant or the runtime is gone.
-async fn write(plant: &Weak<Inner>, file: &Kept) -> Option<io::Result<()>> {
-    let alarms = plant.upgrade()?.alarms.lock().clone();
-    let file = file.clone();
+/// Writes them as they are, and where their drives are; `None`: the plant or the runtime is gone.
+async fn write(plant: &Weak<Inner>, file: &Kept, places: &mut DrivePlaces) -> Option<Result<(), Unwritten>> {
+    let inner = plant.upgrade()?;
+    let alarms = inner.alarms.lock().clone();
+    let drives = alarms.all().iter().filter_map(|alarm| alarm.drive.clone());
+    let place = |drive: String| {
+        // Of one that is gone it is known from when it was there.
+        let now = inner.fleet.drive(&drive).map(|known| known.place().to_string());
+        now.or_else(|| places.get(&drive).cloned()).map(|place| (drive, place))
+    };
+    *places = drives.filter_map(place).collect();
+    drop(inner);
+    let (file, places) = (file.clone(), places.clone());
     let written = spawn_blocking(move || {
-        let text = serde_json::to_vec(&Written { schema: SCHEMA, alarms })?;
-        file.replace(&text, Readers::Owner)
+        file.secure(serde_json::to_vec(&Written { schema: SCHEMA, alarms, places }), Stale::Emptied)
     });
     written.await.ok()
 }

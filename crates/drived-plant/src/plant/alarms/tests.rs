@@ -9,6 +9,7 @@ use tokio::time::sleep;
 use super::*;
 use crate::plant::{testing::TestPlant, watched::Watched};
 use drived_config::{
+    places::Places,
     rights::{Rights, Role, Scope},
     testing::Folder,
 };
@@ -91,7 +92,7 @@ async fn who_may_not_operate_the_drive_does_nothing_about_its_alarm() {
 #[tokio::test(start_paused = true)]
 async fn a_program_that_is_started_anew_has_the_alarms_with_their_notes_and_a_trip_counts_once() {
     let folder = Folder::new("alarms");
-    let kept = || KeptAlarms::in_folder(Some(&folder.file("")));
+    let kept = || KeptAlarms::in_folder(Some(&folder.file("")), &Places::default());
     let test = TestPlant::keeping(1, &kept()).await;
     let keeping = test.plant.keep_alarms(kept());
     let before = tripped(&test).await.alarm;
@@ -105,6 +106,35 @@ async fn a_program_that_is_started_anew_has_the_alarms_with_their_notes_and_a_tr
     assert_eq!(after.acknowledged.unwrap().note.as_deref(), Some("mechanic comes"));
 }
 
+#[tokio::test(start_paused = true)]
+async fn an_alarm_is_of_its_machine_where_the_names_were_exchanged_in_the_file_behind_a_kill() {
+    let folder = Folder::new("alarms-exchanged");
+    let places = |drives: &[(&str, &str)]| {
+        let drives = drives.iter().map(|(name, place)| ((*name).to_owned(), (*place).to_owned()));
+        drives.collect::<Places>().after(["pump 1", "pump 2"].map(str::to_owned))
+    };
+    let kept = |there: &Places| KeptAlarms::in_folder(Some(&folder.file("")), there);
+    let drives = |kept: &KeptAlarms| -> Vec<String> {
+        kept.alarms.all().iter().filter_map(|alarm| alarm.drive.clone()).collect()
+    };
+    // Who says no place is at his name.
+    let there = places(&[("pump 1", "pump 1"), ("pump 2", "pump 2")]);
+    let test = TestPlant::keeping(2, &kept(&there)).await;
+    let keeping = test.plant.keep_alarms(kept(&there));
+    tripped(&test).await;
+    test.plant.close_alarms();
+    keeping.await.unwrap();
+    assert_eq!(drives(&kept(&there)), ["pump 1"]);
+    let exchanged = kept(&places(&[("pump 2", "pump 1"), ("pump 1", "pump 2")]));
+    assert_eq!(drives(&exchanged), ["pump 2"]);
+    // The name is another machine's now, and nobody is where it was.
+    let other = kept(&places(&[("pump 1", "pump 2")]));
+    assert_eq!(drives(&other), ["pump 1 at pump 1"]);
+    // Neither is there.
+    let neither = kept(&places(&[("pump 2", "pump 2")]));
+    assert_eq!(drives(&neither), ["pump 1"]);
+}
+
 #[test]
 fn a_damaged_file_is_put_aside_and_keeps_nobody_from_being_watched() {
     let folder = Folder::new("alarms-damaged");
@@ -114,7 +144,7 @@ fn a_damaged_file_is_put_aside_and_keeps_nobody_from_being_watched() {
         "{\"schema\":2,\"alarms\":{\"last_id\":1,\"dropped\":0,\"alarms\":[]}}",
     ] {
         fs::write(&file, text).unwrap();
-        let kept = KeptAlarms::in_folder(Some(&folder.file("")));
+        let kept = KeptAlarms::in_folder(Some(&folder.file("")), &Places::default());
         assert_eq!(kept.alarms, Alarms::default());
         assert!(!file.exists());
         assert_eq!(fs::read_to_string(folder.file("alarms.json.damaged")).unwrap(), text);

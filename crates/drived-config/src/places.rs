@@ -1,0 +1,118 @@
+//! Where a drive is, and whose is what was kept of it: what outlives the program belongs to a machine, and a name is what a person calls
+//! it at the moment.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use drive_bus::Endpoint;
+use drived_words::drive_spec::DriveName;
+
+use crate::config::LinePart;
+
+/// Where a drive is, whatever it and its line are called: its port, its family and its address, as it is kept in files.
+pub fn place(port: &Endpoint, drive: DriveName) -> String {
+    format!("{port} {drive}")
+}
+
+/// The places of the drives of these lines, by their names.
+pub fn places(lines: &[LinePart]) -> impl Iterator<Item = (&str, String)> {
+    lines.iter().flat_map(|line| {
+        let at = |name| place(&line.config.endpoint, name);
+        line.drives.iter().map(move |drive| (drive.settings.name.as_str(), at(drive.name)))
+    })
+}
+
+/// Which drives there are, and where there were some by earlier configurations.
+#[derive(Debug, Clone, Default)]
+pub struct Places {
+    names: BTreeMap<String, String>,
+    by_name: BTreeMap<String, String>,
+    before: BTreeSet<String>,
+}
+
+impl Places {
+    /// Those of these lines.
+    pub fn of(lines: &[LinePart]) -> Self {
+        places(lines).map(|(name, place)| (name.to_owned(), place)).collect()
+    }
+
+    /// The same, where there were drives at these places by the configuration before this one.
+    #[must_use]
+    pub fn after(self, before: impl IntoIterator<Item = String>) -> Self {
+        Self { before: before.into_iter().collect(), ..self }
+    }
+
+    /// The name of the drive at a place.
+    pub fn name_at(&self, place: &str) -> Option<&str> {
+        self.names.get(place).map(String::as_str)
+    }
+
+    /// Whether there is a drive of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.by_name.contains_key(name)
+    }
+
+    /// The place of the drive to which something belongs that was kept of one of this name; `None`: there is none.
+    ///
+    /// - Who is at the place has it, whatever he is called.
+    /// - A version before this one has kept no place: whoever has the name has it.
+    /// - Where nobody is at the place any more, but the name is at one where nobody was before, its owner has said anew where the drive is: a
+    ///   port that has another path has the same drives. A drive of another family or address may be another machine: it gets a stop that
+    ///   is not confirmed (`stops`), for one too many is better than one too few, and nothing else.
+    /// - Where the name is at a place where there was a drive before, that is another machine, which has nothing to do with it.
+    pub fn now(&self, name: &str, place: Option<&str>, stops: bool) -> Option<&str> {
+        let Some(place) = place else { return self.by_name.get(name).map(String::as_str) };
+        if let Some((place, _)) = self.names.get_key_value(place) {
+            return Some(place);
+        }
+        let drive = |place: &str| place.rsplit(' ').next().map(str::to_owned);
+        let named = self.by_name.get(name).filter(|named| !self.before.contains(*named))?;
+        (stops || drive(named) == drive(place)).then_some(named)
+    }
+}
+
+/// Names with their places.
+impl FromIterator<(String, String)> for Places {
+    fn from_iter<T: IntoIterator<Item = (String, String)>>(drives: T) -> Self {
+        let by_name: BTreeMap<String, String> = drives.into_iter().collect();
+        let names = by_name.iter().map(|(name, place)| (place.clone(), name.clone())).collect();
+        Self { names, by_name, before: BTreeSet::new() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn places(drives: &[(&str, &str)], before: &[&str]) -> Places {
+        let drives = drives.iter().map(|(name, place)| ((*name).to_owned(), (*place).to_owned()));
+        drives.collect::<Places>().after(before.iter().map(|place| (*place).to_owned()))
+    }
+
+    const ONE: &str = "/dev/ttyUSB0 atv312@1";
+    const TWO: &str = "/dev/ttyUSB0 atv312@2";
+
+    #[test]
+    fn what_was_kept_belongs_to_whoever_is_at_the_place_by_whatever_name() {
+        let swapped = places(&[("south", ONE), ("north", TWO)], &[ONE, TWO]);
+        assert_eq!(swapped.now("north", Some(ONE), true), Some(ONE));
+        assert_eq!(swapped.name_at(ONE), Some("south"));
+        // A version before this one has kept the name alone.
+        assert_eq!(swapped.now("north", None, true), Some(TWO));
+        assert_eq!(swapped.now("east", None, true), None);
+    }
+
+    #[test]
+    fn what_was_kept_for_a_place_that_is_nobodys_belongs_to_the_name_where_that_is_no_other_machine() {
+        let port = "/dev/serial/by-id/usb-1 atv312@1";
+        let renamed = places(&[("north", port)], &[ONE]);
+        assert_eq!(renamed.now("north", Some(ONE), false), Some(port));
+        // Another address may be another machine: it gets stops alone.
+        let moved = places(&[("north", "/dev/ttyUSB0 atv312@3")], &[ONE]);
+        assert_eq!(moved.now("north", Some(ONE), false), None);
+        assert_eq!(moved.now("north", Some(ONE), true), Some("/dev/ttyUSB0 atv312@3"));
+        // The machine that was called south is called north now.
+        let other = places(&[("north", TWO)], &[ONE, TWO]);
+        assert_eq!(other.now("north", Some(ONE), true), None);
+        assert_eq!(renamed.now("south", Some(TWO), true), None);
+    }
+}
