@@ -479,9 +479,9 @@ impl Event {
         matches!(self, Self::PowerOff)
     }
 
-    /// Whether its drive hears nothing then.
+    /// Whether its drive hears nothing then, or for a while.
     pub(super) const fn deafens(self) -> bool {
-        matches!(self, Self::PowerOff | Self::CableCut)
+        matches!(self, Self::PowerOff | Self::PowerCycle | Self::CableCut)
     }
 }
 
