@@ -8,6 +8,7 @@ use std::{
 use drived_config::kept::Kept;
 use drived_words::failure::Failure;
 
+/// The file of the state folder.
 const FILE: &str = "lock";
 
 /// Keeps others from the folder of what outlives the daemon, for as long as it is held; also a daemon that is killed gives it back.
