@@ -50,6 +50,7 @@ export function drive(root, name) {
   const big = BIG.map(([text]) => el('div', {}, el('dt', {}, t(text)), el('dd.number'), el('dd.since')));
   const given = big[1].appendChild(el('dd.since'));
   let setpoint = setpointText(setpointOf(shown));
+  let isAnother = false;
   const trendPlace = el('section.panel.trend', { 'aria-label': t('trend') });
   const fault = faultPanel(name);
   const orders = ordersPanel(name);
@@ -87,7 +88,8 @@ export function drive(root, name) {
     if (!names.has('state') && !names.has(`drive ${name}`) && !names.has('event')) return;
     const now = plant.drives.get(name);
     if (now && now.place !== shown.place) {
-      say(named(name, t('now_another', { drive: name })));
+      if (!isAnother) say(t('now_another', { drive: name }));
+      isAnother = true;
       return void dispatchEvent(new HashChangeEvent('hashchange'));
     }
     shown = now ?? shown;
