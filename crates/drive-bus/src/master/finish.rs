@@ -82,8 +82,8 @@ impl<C> Master<C> {
                         let usual = |sent: Sent| sent.usually_by.saturating_duration_since(flight.started);
                         let behind = flight.sent.filter(|_| flight.behind > 0);
                         let own = behind.map_or(took, |sent| took.min(usual(sent)));
-                        let own = crate::mutant!("stop-rests-for-others", own, took);
-                        self.offline.stop_failed(now, slave, own.max(self.in_vain()));
+                        let held_up = crate::mutant!("stop-rests-for-others", own, took);
+                        self.offline.stop_failed(now, slave, held_up.max(self.in_vain()));
                     }
                     let waited = flight.sent.map_or(Duration::ZERO, |sent| {
                         sent.timeout.min(now.saturating_duration_since(sent.end))
