@@ -89,7 +89,7 @@ fn begun(file: &std::path::Path) -> (Fleet, Reloader) {
     let opened = Opened::default();
     let kept = Kept::open(&State::default(), &Places::default());
     let (notify, file) = (Notify::start(), file.to_owned());
-    let reloader = Reloader::new(plant, notify, Names::default(), faces, opened, kept, file, config);
+    let reloader = Reloader::new(plant, notify, Names::default(), faces, opened, kept, (file, config));
     (fleet, reloader)
 }
 
