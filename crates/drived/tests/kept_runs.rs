@@ -166,6 +166,7 @@ fn a_stop_that_was_not_confirmed_of_a_drive_that_is_in_the_file_no_more_is_given
     fs::write(plant.file.path(), text.replace(&table("atv312@1", "north"), "")).expect("it can be written");
     let mut daemon = plant.daemon();
     daemon.wait_for(r#""event":"identified""#);
+    daemon.wait_for_log("nobody gives it: THE MOTOR MAY TURN");
     assert!(plant.kept().contains(r#""stop": "ramp""#), "{}", plant.kept());
     fs::write(plant.file.path(), text.replace("\"north\"", "\"east\"")).expect("it can be written");
     daemon.signal("-HUP");

@@ -163,8 +163,15 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     };
     let shutdown = config.shutdown;
     let beginning = config.lines.is_empty().then(|| args.config.clone());
-    let reloader =
-        Reloader::new(plant.clone(), notify.clone(), names, faces.clone(), opened, kept, args.config, config);
+    let reloader = Reloader::new(
+        plant.clone(),
+        notify.clone(),
+        names,
+        faces.clone(),
+        opened,
+        kept,
+        (args.config, config),
+    );
     let first_hour = setup::Desk::new(reloader.clone());
     let router = api::router(plant.clone())
         .merge(api::reload_router(reloader.clone()))

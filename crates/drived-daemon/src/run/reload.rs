@@ -82,8 +82,7 @@ impl Reloader {
         faces: Faces,
         opened: Opened,
         kept: Kept,
-        file: PathBuf,
-        config: Config,
+        (file, config): (PathBuf, Config),
     ) -> Self {
         let last = std::sync::Mutex::new((true, unix(Instant::now())));
         Self(Arc::new(Inner {

@@ -94,7 +94,7 @@ fn begun_with(file: &std::path::Path, config: Config, lines: &[Line]) -> (Fleet,
     let opened = Opened::default();
     let kept = Kept::open(&State::default(), &Places::default());
     let (notify, file) = (Notify::start(), file.to_owned());
-    let reloader = Reloader::new(plant, notify, Names::default(), faces, opened, kept, file, config);
+    let reloader = Reloader::new(plant, notify, Names::default(), faces, opened, kept, (file, config));
     (fleet, reloader)
 }
 

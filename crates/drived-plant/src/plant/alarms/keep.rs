@@ -23,7 +23,7 @@ const SCHEMA: u32 = 1;
 const FILE: &str = "alarms.json";
 /// What is so where they cannot be read, or could not be written.
 const LOSS: &str =
-    "nobody knows which alarms there were and which were acknowledged; what is wrong then becomes one anew";
+    "nobody knows which alarms were acknowledged, nor which there were; what is wrong becomes an alarm anew";
 
 /// The alarms that were kept, and where.
 #[derive(Debug, Clone, Default)]
