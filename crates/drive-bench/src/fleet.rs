@@ -159,7 +159,8 @@ async fn stop_all(
     queued.expect(run.len());
     let (arrived, used) = (Instant::now(), processor_time());
     let action = Action::Stop(StopMode::Ramp.into());
-    let request = Request { id: None, target: Target::All, action, lifetime: LIFETIME, arrived };
+    let request =
+        Request { id: None, target: Target::All, action, lifetime: LIFETIME, arrived, expects: None };
     let mut told = plant.begin(&caller, request)?;
     let given = processor_time().saturating_sub(used);
     let what = name("a stop of all: processor time until it is given to each");

@@ -499,7 +499,8 @@ mod tests {
         let stopped = spawn_blocking(move || {
             let caller = Caller::new("page", "page", Rights::ALL);
             let (action, arrived) = (Action::Stop(StopMode::Ramp.into()), Instant::now());
-            let request = Request { id: None, target: Target::All, action, lifetime: LIFETIME, arrived };
+            let request =
+                Request { id: None, target: Target::All, action, lifetime: LIFETIME, arrived, expects: None };
             stopping.begin(&caller, request)
         });
         let patience = std::time::Instant::now() + Duration::from_secs(20);
@@ -518,7 +519,8 @@ mod tests {
         let plant = TestPlant::of(u8::try_from(many).unwrap()).await.plant;
         let (caller, arrived) = (Caller::new("page", "page", Rights::ALL), Instant::now());
         let action = Action::Stop(StopMode::Ramp.into());
-        let request = Request { id: None, target: Target::All, action, lifetime: LIFETIME, arrived };
+        let request =
+            Request { id: None, target: Target::All, action, lifetime: LIFETIME, arrived, expects: None };
         let mut told = plant.begin(&caller, request).unwrap();
         let counts = |view: &CommandView| {
             let several = view.several.as_ref().unwrap();
