@@ -857,13 +857,13 @@ def several(page, url, token):
     page.get_by_label("Select all that are shown").check()
     page.locator(".selection").get_by_role("button", name="Start 3").click()
     dialog = page.locator("dialog")
-    expect(dialog).to_contain_text(re.compile(r"These are: pump 1 \([0-9.]+ Hz\), pump 2 \([0-9.]+ Hz\), pump 3 \([0-9.]+ Hz\)\."))
+    expect(dialog).to_contain_text(re.compile(r"These are: pump 1 \([0-9.]+\sHz\), pump 2 \([0-9.]+\sHz\), pump 3 \([0-9.]+\sHz\)\."))
     # A no is no command.
     dialog.get_by_role("button", name="Cancel").click()
     assert not sent, sent
     page.get_by_label("Select pump 2").uncheck()
     page.locator(".selection").get_by_role("button", name="Start 2").click()
-    expect(dialog).to_contain_text(re.compile(r"These are: pump 1 \([0-9.]+ Hz\), pump 3 \([0-9.]+ Hz\)\."))
+    expect(dialog).to_contain_text(re.compile(r"These are: pump 1 \([0-9.]+\sHz\), pump 3 \([0-9.]+\sHz\)\."))
     dialog.locator("button.primary").click()
     expect(page.locator(".several")).to_contain_text("pump 1, pump 3")
     path, body = sent[-1]

@@ -2,6 +2,7 @@
 
 use std::{borrow::Cow, sync::Arc};
 
+use drive_bus::Endpoint;
 use drive_core::{Measurements, Status};
 use drive_families::Family;
 use drive_fleet::{
@@ -71,7 +72,12 @@ impl DriveView {
 
 /// At which machine the commands of a drive arrive, whatever it is called.
 pub fn place_of(drive: &DriveHandle) -> String {
-    let port = drive.line().1.config().endpoint;
+    let (line, port) = drive.line();
+    let port = match port.config().endpoint {
+        // One stream is told from another by its line alone.
+        Endpoint::Stream => line.to_string(),
+        port => port.to_string(),
+    };
     format!("{port} {}@{}", drive.capabilities().key, drive.slave().number())
 }
 
