@@ -73,6 +73,14 @@ fn no_cell_that_was_a_find_is_one_again() {
         ("A:97350993", "the same in a setpoint"),
         ("W:366934", "the late confirmation by 10h of another value, told as that of the next write"),
         ("A:154333284", "the same behind a gateway"),
+        (
+            "A:143205551",
+            "an adapter's first echo in front of a drive that had lost its supply for a moment: the matrix was wrong",
+        ),
+        (
+            "A:69246507",
+            "an answer that came twice, taken for the next of the same words: the matrix was wrong",
+        ),
         ("A:128469787", "an equal stop, confirmed by the answer to the one before it: the matrix was wrong"),
         (
             "W:177444",
