@@ -233,6 +233,20 @@ async fn a_panel_that_takes_control_is_told_where_the_drive_tells_it() {
     }
 }
 
+/// Whoever asks for a stop hears what it says, which is not old by then; each repetition is a call of its own.
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_answers_and_runs_by_its_panel_is_not_waited_for_as_one_that_is_on_its_way() {
+    for key in ["goodrive", "v20", "danfoss-fc"] {
+        let mut rig = running(key).await;
+        rig.machine.panel(drive_sim::Panel::TakeControl);
+        rig.machine.panel(drive_sim::Panel::Run);
+        let begun = tokio::time::Instant::now();
+        let error = rig.drive.stop(StopMode::Ramp).await.expect_err("its panel runs it");
+        assert_eq!(error.kind(), ErrorKind::NotConfirmed, "{key}: {error}");
+        assert!(begun.elapsed().as_millis() < 1_000, "{key}: {error}");
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn it_trips_and_is_reset_and_nothing_starts_by_itself() {
     for key in DRIVEN {

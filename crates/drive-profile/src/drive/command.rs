@@ -196,8 +196,8 @@ impl<P: Port> ProfileDrive<P> {
         let mut written = self.write_stop(action, order).await?;
         self.registers.owe_judgement();
         let mut confirming = Confirming::begin();
-        let mut again = Instant::now() + SETTLED_WITHIN;
-        let mut first: Option<Frequency> = None;
+        let settled = Instant::now() + SETTLED_WITHIN;
+        let (mut again, mut first) = (settled, None::<Frequency>);
         loop {
             let (mut status, _) = match self.read_status(Class::Command).await {
                 Ok(read) => read,
@@ -231,9 +231,10 @@ impl<P: Port> ProfileDrive<P> {
                 written = self.write_stop(action, order).await.map_err(Error::after_write)?;
                 again = Instant::now() + SETTLED_WITHIN;
             }
-            if !confirming.again().await {
+            // One that somebody else commands does not obey however long that is waited for, and what it says is told.
+            let because = (status.control == Some(Control::Local)).then_some(OTHERS);
+            if because.is_some() && Instant::now() >= settled || !confirming.again().await {
                 written.map_err(Error::after_write)?;
-                let because = (status.control == Some(Control::Local)).then_some(OTHERS);
                 return Err(self.not_confirmed(order, status, because));
             }
         }
