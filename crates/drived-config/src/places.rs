@@ -6,19 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use drive_bus::Endpoint;
 use drived_words::drive_spec::DriveName;
 
-use crate::config::LinePart;
-
 /// Where a drive is, whatever it and its line are called: its port, its family and its address, as it is kept in files.
 pub fn place(port: &Endpoint, drive: DriveName) -> String {
     format!("{port} {drive}")
-}
-
-/// The places of the drives of these lines, by their names.
-pub fn places(lines: &[LinePart]) -> impl Iterator<Item = (&str, String)> {
-    lines.iter().flat_map(|line| {
-        let at = |name| place(&line.config.endpoint, name);
-        line.drives.iter().map(move |drive| (drive.settings.name.as_str(), at(drive.name)))
-    })
 }
 
 /// Which drives there are, and where there were some by earlier configurations.
@@ -30,11 +20,6 @@ pub struct Places {
 }
 
 impl Places {
-    /// Those of these lines.
-    pub fn of(lines: &[LinePart]) -> Self {
-        places(lines).map(|(name, place)| (name.to_owned(), place)).collect()
-    }
-
     /// The same, where there were drives at these places by the configuration before this one.
     #[must_use]
     pub fn after(self, before: impl IntoIterator<Item = String>) -> Self {
@@ -71,9 +56,10 @@ impl Places {
 }
 
 /// Names with their places.
-impl FromIterator<(String, String)> for Places {
-    fn from_iter<T: IntoIterator<Item = (String, String)>>(drives: T) -> Self {
-        let by_name: BTreeMap<String, String> = drives.into_iter().collect();
+impl<N: Into<String>> FromIterator<(N, String)> for Places {
+    fn from_iter<T: IntoIterator<Item = (N, String)>>(drives: T) -> Self {
+        let by_name: BTreeMap<String, String> =
+            drives.into_iter().map(|(name, place)| (name.into(), place)).collect();
         let names = by_name.iter().map(|(name, place)| (place.clone(), name.clone())).collect();
         Self { names, by_name, before: BTreeSet::new() }
     }
@@ -84,7 +70,7 @@ mod tests {
     use super::*;
 
     fn places(drives: &[(&str, &str)], before: &[&str]) -> Places {
-        let drives = drives.iter().map(|(name, place)| ((*name).to_owned(), (*place).to_owned()));
+        let drives = drives.iter().map(|(name, place)| (*name, (*place).to_owned()));
         drives.collect::<Places>().after(before.iter().map(|place| (*place).to_owned()))
     }
 

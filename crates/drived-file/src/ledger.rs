@@ -8,6 +8,7 @@ use drive_fleet::{EEPROM_WRITES_A_DAY, EepromLedger};
 
 use crate::Config;
 use drived_config::{
+    config::places,
     kept::Kept,
     names::places_before,
     places::{Places, place},
@@ -62,7 +63,7 @@ impl LedgerArgs {
         let name = drive.settings.name.clone();
         let folder = config.doors.state.folder.as_deref();
         let folder = folder.ok_or_else(|| format!("{file} has no state folder"))?;
-        let places = Places::of(&config.lines).after(places_before(Some(folder)));
+        let places = places(&config.lines).collect::<Places>().after(places_before(Some(folder)));
         Ok(Found { file: folder.join(FILE), places, name, place: place(&line.endpoint, drive.name) })
     }
 }

@@ -26,6 +26,8 @@ class V20(Drive):
         for a, k in ((10, "p1120"), (11, "p1121")):
             self.reg(a, lambda k=k: p[k] * 100, lambda v, k=k: self.ramp_par(k, v))
         self.reg(15, lambda: p["p2000"] * 100, self.set_p2000)
+        for a in range(16, 23):              # 40017..40023: limits and gains of the PID controller (2012, p112)
+            self.reg(a, lambda: 0)
         for base, scale in ((23, 1), (341, 1)):
             self.reg(base, lambda: self.out_hz * 100)
         self.reg(24, lambda: self.out_hz * 30)

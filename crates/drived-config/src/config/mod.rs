@@ -35,6 +35,14 @@ pub fn drive_keys() -> &'static [Key] {
     drive::DriveEntry::KEYS
 }
 
+/// The places of the drives of these lines, by their names.
+pub fn places(lines: &[LinePart]) -> impl Iterator<Item = (&str, String)> {
+    lines.iter().flat_map(|line| {
+        let at = |name| place(&line.config.endpoint, name);
+        line.drives.iter().map(move |drive| (drive.settings.name.as_str(), at(drive.name)))
+    })
+}
+
 /// A line and its drives.
 #[derive(Debug)]
 pub struct LinePart {

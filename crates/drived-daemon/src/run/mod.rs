@@ -35,7 +35,7 @@ use self::{
     report::{Form, Report},
 };
 use drived_config::{
-    config::{Group, LinePart, add},
+    config::{Group, LinePart, add, places},
     kept::{BALLAST, lay_ballast},
     names::{self, Names, PLACES, Told},
     places::{Places, place},
@@ -119,7 +119,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
             folder.join(BALLAST).display()
         );
     }
-    let places = Places::of(&config.lines).after(names::places_before(folder));
+    let places = places(&config.lines).collect::<Places>().after(names::places_before(folder));
     let kept = kept::Kept::open(state, &places);
     let (tell_runs, told_runs) = mpsc::unbounded_channel();
     let builder = build(&config, &lines, |place| kept.of(place)).keep_runs(tell_runs);

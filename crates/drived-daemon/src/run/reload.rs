@@ -25,9 +25,9 @@ use super::{
     profiles::Opened,
 };
 use drived_config::{
-    config::{DrivePart, add},
+    config::{DrivePart, add, places},
     names::Names,
-    places::{place, places},
+    places::place,
 };
 use drived_file::{Config, is_one_wire};
 use drived_http::api::Reload;
