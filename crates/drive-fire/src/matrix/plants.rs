@@ -120,7 +120,7 @@ const FOUND: &[(&str, &str)] = &[
     ("line: command-sent-late", "E:26300"),
     ("line: lost-write-told-as-expired", "A:200156991"),
     ("line: sent-told-as-unsent", "F:4374893"),
-    ("line: late-answer-unfeared", "F:2261288"),
+    ("line: late-answer-unfeared", "F:1853738"),
 ];
 
 /// The same of the stories.
@@ -137,7 +137,7 @@ const FOUND_BY_STORIES: &[(&str, &str)] = &[
     ("line: crc-unchecked", "7.3.0.o6.l1.o11.f28x3.o7.l6"),
     ("line: transaction-unchecked", "7.4.0.o11.o5.o3.o11.f12x2.l5.o9.f71x2.o11.l6.f63x2.o11.o8"),
     ("line: early-answer-believed", "3.0.0.f34x2.o7.o8.e18.o13.f60x1.o2.o8.e8.e15.o6.l1.l2.o0"),
-    ("line: late-answer-unfeared", "8.3.0.l5.o7.l8.f8x2.o6.o6.f72x3.f22x0.e9.f69x1.e1.l1.e5"),
+    ("line: late-answer-unfeared", "7.0.0.o10.l6.f69x1.o11.f10x0.o5.o7.o3.l3.o6.o0.o8"),
     ("line: edge-repeated", "2.1.0.l4.l2.f31x0.e10.o1.f25x1.l7.o15.o12.o8.f42x4.f34x0.o11.f33x4"),
     ("line: command-sent-late", "1.4.0.o5.f16x0.o9.o7.e15.f70x5.e12.o6.l8.o11.f62x2.o5.e5.o5.l8"),
     ("line: sent-told-as-unsent", "0.4.0.o5.l5.l4.o19.o8.f62x0.l8.o10.o19.o6.f35x3.e18.f16x1.o16.f13x0"),
