@@ -58,7 +58,7 @@ async fn reader(number: u16, http: SocketAddr, over: Arc<AtomicBool>) -> Tally {
             }
             None => {}
         }
-        if number % 4 != 0 {
+        if !number.is_multiple_of(4) {
             client.leave();
         }
         sleep(SECOND.saturating_sub(begun.elapsed())).await;
