@@ -46,6 +46,7 @@ fn pour(port: u16, head: &str, piece: &[u8]) -> String {
 }
 
 #[test]
+#[expect(clippy::disallowed_methods, reason = "the test has a thread of its own")]
 fn whatever_comes_over_http_statuses_keep_coming_and_a_stop_is_carried_out() {
     let mut sim = Sim::serve("abused", &["atv312@1-2"]);
     let port = free_port();
