@@ -212,7 +212,7 @@ impl Fleet {
     /// The policies are on their way when this returns.
     ///
     /// # Cancellation
-    /// When the future is dropped the policies go on, without a limit.
+    /// When the future is dropped the policies go on, without a limit, and the drives are asked on.
     #[must_use = "a drive that was not stopped may run"]
     pub fn shutdown(
         &self,

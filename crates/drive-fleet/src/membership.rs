@@ -114,11 +114,12 @@ impl Fleet {
     }
 
     /// Takes drives out of the fleet: the policy of each acts as at a [`shutdown`](Self::shutdown), within `limit`, and what
-    /// was done is listed. Handles of it refuse every command from then on. Names that the fleet does not have are left out.
+    /// was done is listed. Handles of it refuse every command but a stop from then on; it is asked and stopped like any other until the
+    /// policies of all of them are done, and refuses stops too once they have gone. Names that the fleet does not have are left out.
     /// The policies are on their way when this returns.
     ///
     /// # Cancellation
-    /// When the future is dropped the policies go on, and the drives stay listed.
+    /// When the future is dropped the policies go on, and the drives stay listed and are asked on.
     #[must_use = "a drive that was not stopped may run"]
     pub fn remove(
         &self,
