@@ -3,6 +3,8 @@
 use std::{fs, os::unix::fs::symlink};
 
 use super::*;
+#[cfg(target_os = "linux")]
+use crate::testing::Disk;
 use crate::testing::Folder;
 
 #[test]
@@ -117,50 +119,9 @@ fn one_after_the_other_changes_a_folder() {
     assert_eq!(kept.read().unwrap().unwrap().0.len(), 80);
 }
 
-/// A disk of its own, where whoever runs the tests may mount one.
 #[cfg(target_os = "linux")]
-struct Disk(std::path::PathBuf);
-
-#[cfg(target_os = "linux")]
-impl Disk {
-    fn of(name: &str) -> Option<Self> {
-        let at = std::env::temp_dir().join(format!("drived-disk-{name}-{}", std::process::id()));
-        fs::create_dir_all(&at).unwrap();
-        let mut mount = std::process::Command::new("mount");
-        mount.args(["-t", "tmpfs", "-o", "size=768k", "tmpfs"]).arg(&at).stderr(std::process::Stdio::null());
-        let disk = Self(at);
-        if mount.status().is_ok_and(|code| code.success()) {
-            return Some(disk);
-        }
-        println!("skipped: this machine gives no disk to mount");
-        None
-    }
-
-    fn file(&self, name: &str) -> std::path::PathBuf {
-        self.0.join(name)
-    }
-
-    /// Takes whatever is free.
-    fn fill(&self) {
-        let mut fill = fs::OpenOptions::new().create(true).append(true).open(self.file("fill")).unwrap();
-        while fill.write_all(&[0x55; 512]).is_ok() {}
-    }
-
-    fn ballast(&self) -> u64 {
-        fs::metadata(self.file(BALLAST)).map_or(0, |known| known.len())
-    }
-}
-
-#[cfg(target_os = "linux")]
-impl Drop for Disk {
-    fn drop(&mut self) {
-        let _ = std::process::Command::new("umount")
-            .arg("-l")
-            .arg(&self.0)
-            .stderr(std::process::Stdio::null())
-            .status();
-        let _ = fs::remove_dir_all(&self.0);
-    }
+fn ballast(disk: &Disk) -> u64 {
+    fs::metadata(disk.file(BALLAST)).map_or(0, |known| known.len())
 }
 
 #[cfg(target_os = "linux")]
@@ -172,8 +133,8 @@ fn secured(kept: &Kept, content: &[u8], stale: Stale) -> Result<(), Unwritten> {
 #[cfg(target_os = "linux")]
 fn a_full_disk_has_room_for_what_is_secured_as_long_as_there_is_ballast_which_is_made_anew_with_room() {
     let Some(disk) = Disk::of("ballast") else { return };
-    lay_ballast(&disk.0).unwrap();
-    let whole = disk.ballast();
+    lay_ballast(disk.path()).unwrap();
+    let whole = ballast(&disk);
     assert_eq!(whole, 256 << 10);
     assert!(fs::metadata(disk.file(BALLAST)).is_ok_and(|known| {
         use std::os::unix::fs::MetadataExt as _;
@@ -185,8 +146,8 @@ fn a_full_disk_has_room_for_what_is_secured_as_long_as_there_is_ballast_which_is
         disk.fill();
         secured(&kept, &[round; 9_000], Stale::Emptied).unwrap();
         assert_eq!(kept.read_secured().unwrap().unwrap(), [round; 9_000]);
-        assert!(disk.ballast() <= last);
-        last = disk.ballast();
+        assert!(ballast(&disk) <= last);
+        last = ballast(&disk);
     }
     assert_eq!(last, 0, "others took what was free each time");
     // Its own room is left.
@@ -195,7 +156,7 @@ fn a_full_disk_has_room_for_what_is_secured_as_long_as_there_is_ballast_which_is
     assert_eq!(kept.read_secured().unwrap().unwrap(), b"alone");
     fs::remove_file(disk.file("fill")).unwrap();
     secured(&kept, b"room", Stale::Emptied).unwrap();
-    assert_eq!(disk.ballast(), whole);
+    assert_eq!(ballast(&disk), whole);
 }
 
 #[test]
@@ -215,7 +176,7 @@ fn what_cannot_be_written_is_known_as_old_by_whoever_reads_it_unless_the_old_is_
     let told = secured(&left, &much, Stale::Left).unwrap_err().to_string();
     assert!(told.contains("what stands there is old"), "{told}");
     assert_eq!(left.read_secured().unwrap().unwrap(), b"old");
-    let names: Vec<_> = fs::read_dir(&disk.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    let names: Vec<_> = fs::read_dir(disk.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert!(
         !names.iter().any(|name| name.as_bytes().ends_with(b".new")),
         "half of it keeps no room: {names:?}"

@@ -314,6 +314,23 @@ mod tests {
         assert!(matches!(verify(&path).unwrap(), Verdict::Unbroken { records: 3, torn: 0, .. }));
     }
 
+    /// A card that was mounted anew after an error, to be read alone: motors may turn that have to be stopped.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_log_that_can_only_be_read_is_opened_and_goes_on_once_it_can_be_written() {
+        let Some(disk) = drived_config::testing::Disk::of("audit") else { return };
+        let path = disk.file("audit");
+        File::open(&path).unwrap().append(&record("first")).unwrap();
+        File::open_refused(&disk.file("audit.refused")).unwrap();
+        disk.is_only_read(true);
+        let mut file = File::open(&path).unwrap();
+        let mut refused = File::open_refused(&disk.file("audit.refused")).unwrap();
+        assert!(file.append(&record("second")).is_err() && refused.append(&record("second")).is_err());
+        disk.is_only_read(false);
+        file.append(&record("third")).unwrap();
+        assert!(matches!(verify(&path).unwrap(), Verdict::Unbroken { records: 2, torn: 0, .. }));
+    }
+
     #[test]
     fn records_that_are_written_together_are_a_chain_as_if_each_were_alone() {
         let folder = Folder::new("together");
