@@ -100,7 +100,10 @@ pub struct Rs485 {
     pub receive_while_sending: bool,
 }
 
-/// Configuration of a line. Start from one of the constructors and change what is special:
+/// No time of a line is longer: what is more, such as a [`Duration::MAX`] for "for ever", counts as this.
+pub const LONGEST: Duration = Duration::from_secs(3_600);
+
+/// Configuration of a line; its times are no longer than [`LONGEST`]. Start from one of the constructors and change what is special:
 ///
 /// ```
 /// use std::time::Duration;
@@ -219,6 +222,29 @@ impl LineConfig {
         Self { double_window: Duration::ZERO, ..Self::to(Endpoint::Stream, serial) }
     }
 
+    /// As a line takes it: its times are no longer than [`LONGEST`], and one request may wait in any case, so that a stop may.
+    pub(crate) fn bounded(mut self) -> Self {
+        for time in [
+            &mut self.response_timeout,
+            &mut self.timeout_floor,
+            &mut self.late_window,
+            &mut self.broadcast_pause,
+            &mut self.slave_change_gap,
+            &mut self.chunk_gap,
+            &mut self.probe_backoff.0,
+            &mut self.probe_backoff.1,
+            &mut self.double_window,
+        ] {
+            *time = LONGEST.min(*time);
+        }
+        if let Some(wait) = self.gateway.as_mut().and_then(|gateway| gateway.wait.as_mut()) {
+            *wait = LONGEST.min(*wait);
+        }
+        self.queue_limit = self.queue_limit.max(1);
+        self.slaves.values_mut().for_each(|slave| *slave = slave.bounded());
+        self
+    }
+
     fn to(endpoint: Endpoint, serial: SerialSettings) -> Self {
         let echo = if endpoint.is_serial() { Echo::Auto } else { Echo::Off };
         Self {
@@ -282,13 +308,14 @@ impl LineConfig {
     /// first write after opening.
     #[must_use]
     pub fn worst_case_stop(&self, longest_request: usize, longest_answer: usize) -> Duration {
-        let timeouts = self.slaves.values().filter_map(|slave| slave.response_timeout);
-        let timeout = timeouts.chain([self.response_timeout]).max().unwrap_or(self.response_timeout);
-        let timeout = timeout.max(self.broadcast_pause);
-        let asks_echo = self.echo == Echo::Auto && self.protocol.asks_for_echo();
-        let bound = self.stop_bound((longest_request, longest_answer), timeout, asks_echo, true);
-        let Some(gateway) = self.far_end() else { return bound };
-        bound + gateway.stop_waits() + self.behind_gateway((longest_request, longest_answer), timeout)
+        let config = self.clone().bounded();
+        let timeouts = config.slaves.values().filter_map(|slave| slave.response_timeout);
+        let timeout = timeouts.chain([config.response_timeout]).max().unwrap_or(config.response_timeout);
+        let timeout = timeout.max(config.broadcast_pause);
+        let asks_echo = config.echo == Echo::Auto && config.protocol.asks_for_echo();
+        let bound = config.stop_bound((longest_request, longest_answer), timeout, asks_echo, true);
+        let Some(gateway) = config.far_end() else { return bound };
+        bound + gateway.stop_waits() + config.behind_gateway((longest_request, longest_answer), timeout)
     }
 
     /// What there may be between the line's port and the drives.
@@ -401,4 +428,13 @@ pub struct SlaveSettings {
     pub turnaround: Duration,
     /// Its own ceiling of the response timeout; `None`: the line's.
     pub response_timeout: Option<Duration>,
+}
+
+impl SlaveSettings {
+    pub(crate) fn bounded(self) -> Self {
+        Self {
+            turnaround: self.turnaround.min(LONGEST),
+            response_timeout: self.response_timeout.map(|time| time.min(LONGEST)),
+        }
+    }
 }

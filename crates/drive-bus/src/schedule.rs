@@ -9,12 +9,15 @@
 //!   its turn, so that a line that is too slow for what is asked of it still asks every slave as often as every other.
 //! - **Aging**: whatever has waited for [`Rules::aging`] may take every fourth turn, but never a Stop's. A keep-alive ages
 //!   ten times as fast and goes first among what has aged: behind a stream of commands its drive would trip.
+//! - **One slave's Commands** go ahead of what others wait for sixteen times; from then on Status and KeepAlive have every second
+//!   turn, until it has had no Command for a second.
 //! - **Background** gets every twentieth turn when it would otherwise get none.
 //! - What is not yet sent may be **replaced** by a later request with the same key, **expires** at its lifetime, and may
 //!   be **withdrawn**.
 //! - A slave that needs a pause does not hold up the others, except that nothing longer than the pause starts in front
 //!   of a Command.
 
+mod share;
 mod waiting;
 
 use std::{cmp::Reverse, collections::BTreeMap, time::Duration};
@@ -22,6 +25,7 @@ use std::{cmp::Reverse, collections::BTreeMap, time::Duration};
 use drive_core::{Class, Terms};
 use tokio::time::Instant;
 
+use share::Shares;
 use waiting::Waiting;
 
 /// At most every so-many-th turn goes to what has aged: a stream of commands keeps three quarters of the line.
@@ -112,6 +116,7 @@ pub struct Schedule<T> {
     round: BTreeMap<Class, u64>,
     since_aged: u32,
     since_background: u32,
+    shares: Shares,
     /// Of each queued entry that was asked for it, while choosing.
     readiness: Vec<Option<Readiness>>,
 }
@@ -128,6 +133,7 @@ impl<T> Schedule<T> {
             round: BTreeMap::new(),
             since_aged: 0,
             since_background: 0,
+            shares: Shares::new(),
             readiness: Vec::new(),
         }
     }
@@ -319,9 +325,18 @@ impl<T> Schedule<T> {
         let Some(index) = best else {
             return waiting.soonest(|_| true, |_| true).map(Best::At);
         };
+        let first = self.queued.get(index)?;
+        if first.terms.class == Class::Command
+            && self.shares.gives_way(now, first.slave)
+            && let Some(other) = waiting.first(now, |entry| {
+                asks_for_another(first.slave, entry).then_some((Reverse(entry.terms.class), entry.rank))
+            })
+        {
+            return Some(Best::Now(other));
+        }
         // What would still be on the line when a Command's pause is over does not start in front of it.
         let over_at = now + waiting.of(index)?.takes;
-        if self.queued.get(index)?.terms.class < Class::Command
+        if first.terms.class < Class::Command
             && let Some(at) = waiting.soonest(|entry| entry.terms.class == Class::Command, |_| true)
             && at < over_at
         {
@@ -354,7 +369,15 @@ impl<T> Schedule<T> {
             .any(|(index, entry)| index != chosen && entry.terms.class == Class::Background);
         self.since_aged = count(aged_waits, aged, self.since_aged);
         self.since_background = count(background_waits, class == Class::Background, self.since_background);
+        let slave = entry.slave;
+        let others_wait = self.queued.iter().any(|entry| asks_for_another(slave, entry));
+        self.shares.count(now, class, slave, others_wait);
     }
+}
+
+/// Whether it asks what keeps another slave known and its watchdog fed.
+fn asks_for_another<T>(slave: u8, entry: &Entry<T>) -> bool {
+    entry.slave != slave && matches!(entry.terms.class, Class::Status | Class::KeepAlive)
 }
 
 #[cfg(test)]

@@ -112,6 +112,23 @@ impl Shared {
         self.retractions.subscribe()
     }
 
+    /// The task has gone: what is under way ends as where a port is lost, and nothing is taken any more.
+    pub(crate) fn end(&self) {
+        const GONE: &str = "the task of the line has ended";
+        let now = Instant::now();
+        let mut master = self.master();
+        if !master.is_finished() {
+            master.handle_lost(now, GONE);
+        }
+        master.handle_down(GONE);
+        master.handle_close();
+        let ended: Vec<_> = std::iter::from_fn(|| master.poll_outcome()).collect();
+        drop(master);
+        for (caller, outcome) in ended {
+            caller.answer(outcome, now);
+        }
+    }
+
     fn close(&self) {
         self.master().handle_close();
         self.wake.notify_one();

@@ -115,6 +115,7 @@ impl Task {
     }
 
     pub(crate) async fn run(mut self) {
+        let _ends = Ends(Arc::clone(&self.shared));
         while let Some(deadline) = self.decide().await {
             self.shared.count_round();
             let event = self.next_event(deadline).await;
@@ -137,8 +138,6 @@ impl Task {
                 Event::Woken => {}
             }
         }
-        // With the tap the capture ends: its writer finishes the file.
-        *self.shared.tap() = None;
     }
 
     /// Lets the master decide and writes what it wants written, until there is nothing to do but wait. `None`: the end.
@@ -351,6 +350,8 @@ impl Task {
         self.shared.count_loss();
         self.shared.master().handle_lost(now, reason);
         self.port = if self.backoff > REOPEN_BACKOFF.0 {
+            // It was opened, and lost without a byte: that may go on for ever, and whoever waits is told.
+            self.shared.master().handle_down(reason);
             Connection::Waiting(now + self.backoff)
         } else if let Some(opening) = self.connector.connect() {
             // The first attempt is made at once: a plug that was pulled and put back, a server that started anew.
@@ -369,6 +370,17 @@ impl Task {
 
     fn lengthen_backoff(&mut self) {
         self.backoff = (self.backoff * 2).min(REOPEN_BACKOFF.1);
+    }
+}
+
+/// Ends the line with its task, however that ends: by its end, with its runtime, by the panic of a port that somebody else has made.
+struct Ends(Arc<Shared>);
+
+impl Drop for Ends {
+    fn drop(&mut self) {
+        // With the tap the capture ends: its writer finishes the file.
+        *self.0.tap() = None;
+        self.0.end();
     }
 }
 

@@ -2,8 +2,10 @@
 
 mod support;
 
-use drive_bus::{Echo, LineConfig, exchange::rtu};
-use drive_core::PortError;
+use std::time::Duration;
+
+use drive_bus::{Echo, Gateway, LineConfig, SlaveSettings, exchange::rtu};
+use drive_core::{Class, PortError, Terms};
 use support::{MS, calls, characters, line, read, reads, write, writes};
 use tokio::time::Instant;
 use tokio_modbus::{ExceptionCode, Request, client::Client, client::Context, prelude::*};
@@ -19,6 +21,33 @@ async fn an_answer_reaches_its_caller_through_a_tokio_modbus_context() {
     let call = tokio::spawn(async move { context.read_holding_registers(3201, 2).await });
     assert_eq!(peer.answer(&[3, 4, 0x12, 0x34, 0x56, 0x78]).await, rtu::frame(3, &[3, 0x0C, 0x81, 0, 2]));
     assert_eq!(call.await.unwrap().unwrap(), Ok(vec![0x1234, 0x5678]));
+}
+
+/// As somebody writes who wants to wait for ever.
+#[tokio::test(start_paused = true)]
+async fn a_line_whose_times_are_as_long_as_can_be_and_whose_queue_has_no_room_serves_and_stops() {
+    const EVER: Duration = Duration::MAX;
+    let changes: [fn(LineConfig) -> LineConfig; 9] = [
+        |config| LineConfig { response_timeout: EVER, ..config },
+        |config| LineConfig { timeout_floor: EVER, ..config },
+        |config| LineConfig { late_window: EVER, ..config },
+        |config| LineConfig { broadcast_pause: EVER, slave_change_gap: EVER, ..config },
+        |config| LineConfig { chunk_gap: EVER, double_window: EVER, ..config },
+        |config| LineConfig { probe_backoff: (EVER, EVER), ..config },
+        |config| LineConfig { gateway: Some(Gateway { at_once: None, wait: Some(EVER) }), ..config },
+        |config| config.slave(3, SlaveSettings { turnaround: EVER, response_timeout: Some(EVER) }),
+        |config| LineConfig { queue_limit: 0, ..config },
+    ];
+    for (change, number) in changes.into_iter().zip(0..) {
+        let (line, mut peer) = line(change);
+        assert!(line.worst_case_stop() > Duration::ZERO, "{number}");
+        let stop = writes(line.slave(3).with_terms(Terms::of(Class::Stop)), 8501, 0);
+        peer.answer(&[6, 0x21, 0x35, 0, 0]).await;
+        assert_eq!(stop.await.unwrap(), Ok(()), "{number}");
+        let read = reads(line.slave(3), 3201, 1);
+        peer.answer(&[3, 2, 0, 7]).await;
+        assert_eq!(read.await.unwrap(), Ok(vec![7]), "{number}");
+    }
 }
 
 #[tokio::test(start_paused = true)]

@@ -148,6 +148,101 @@ async fn a_port_that_opens_and_ends_at_once_is_tried_ever_less_often() {
     assert_eq!(pauses, [0, 200, 400, 800, 1_600, 2_000, 2_000, 2_000]);
 }
 
+/// A serial server that has its one client already opens each connection, and ends it at once.
+#[tokio::test(start_paused = true)]
+async fn a_call_over_a_port_that_opens_and_ends_at_once_for_ever_is_told_so() {
+    let open = || async { Ok(tokio::io::duplex(512).0) };
+    let line = Line::over_reopened(open, LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+    for class in [Class::Status, Class::Stop] {
+        let stop = writes(line.slave(1).with_terms(Terms::of(class)), 8501, 0);
+        let read = reads(line.slave(1), 0, 1);
+        let both = tokio::time::timeout(60_000 * MS, async { (stop.await.unwrap(), read.await.unwrap()) });
+        let both = both.await.expect("it ends");
+        assert!(
+            matches!(both, (Err(PortError::LineDown(_)), Err(PortError::LineDown(_)))),
+            "{class}: {both:?}"
+        );
+    }
+}
+
+/// A port of somebody else's making, that does what none may.
+struct Panics;
+
+impl tokio::io::AsyncRead for Panics {
+    fn poll_read(
+        self: std::pin::Pin<&mut Self>,
+        _: &mut std::task::Context<'_>,
+        _: &mut tokio::io::ReadBuf<'_>,
+    ) -> std::task::Poll<io::Result<()>> {
+        panic!("a port that panics, for a test");
+    }
+}
+
+impl tokio::io::AsyncWrite for Panics {
+    fn poll_write(
+        self: std::pin::Pin<&mut Self>,
+        _: &mut std::task::Context<'_>,
+        bytes: &[u8],
+    ) -> std::task::Poll<io::Result<usize>> {
+        std::task::Poll::Ready(Ok(bytes.len()))
+    }
+
+    fn poll_flush(
+        self: std::pin::Pin<&mut Self>,
+        _: &mut std::task::Context<'_>,
+    ) -> std::task::Poll<io::Result<()>> {
+        std::task::Poll::Ready(Ok(()))
+    }
+
+    fn poll_shutdown(
+        self: std::pin::Pin<&mut Self>,
+        _: &mut std::task::Context<'_>,
+    ) -> std::task::Poll<io::Result<()>> {
+        std::task::Poll::Ready(Ok(()))
+    }
+}
+
+/// Whatever has ended the task of a line, nothing is sent any more.
+async fn ends_every_call(line: &Line) {
+    for class in [Class::Status, Class::Stop] {
+        let mut slave = line.slave(1).with_terms(Terms::of(class));
+        let read = tokio::time::timeout(60_000 * MS, read(&mut slave, 0, 1)).await.expect("it ends");
+        assert_eq!(read, Err(PortError::Closed), "{class}");
+    }
+    assert!(line.stats().away.is_some(), "it says that it is away");
+    line.close().await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_line_whose_port_panics_ends_every_call_that_waits_or_comes() {
+    let line = Line::over(Panics, LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+    let waits = reads(line.slave(1), 0, 1);
+    let waits = tokio::time::timeout(60_000 * MS, waits).await.expect("it ends").unwrap();
+    assert!(matches!(waits, Err(PortError::LineDown(_) | PortError::Closed)), "{waits:?}");
+    ends_every_call(&line).await;
+}
+
+#[test]
+fn a_line_whose_runtime_has_ended_ends_every_call_from_another() {
+    let made =
+        || tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build().unwrap();
+    let (its, ours) = (made(), made());
+    let (near, mut far) = tokio::io::duplex(512);
+    let line = its.block_on(async { Line::over(near, LineConfig::stream(SerialSettings::MODBUS_DEFAULT)) });
+    let (mut reading, mut writing) = (line.slave(1), line.slave(1));
+    let calls = ours
+        .spawn(async move { tokio::join!(support::write(&mut writing, 8501, 15), read(&mut reading, 0, 1)) });
+    ours.block_on(tokio::task::yield_now());
+    // The write is on the line, and the read waits behind it.
+    its.block_on(far.read_exact(&mut [0; 8])).unwrap();
+    drop(its);
+    let calls = async { tokio::time::timeout(60_000 * MS, calls).await.expect("they end").unwrap() };
+    let (written, waited) = ours.block_on(calls);
+    assert!(matches!(written, Err(PortError::OutcomeUnknown(_))), "{written:?}");
+    assert!(matches!(waited, Err(PortError::LineDown(_) | PortError::Closed)), "{waited:?}");
+    ours.block_on(ends_every_call(&line));
+}
+
 #[tokio::test]
 async fn a_missing_port_is_named() {
     let path = "/dev/no-such-port";

@@ -118,6 +118,7 @@ impl<C> Master<C> {
     /// A line whose port is not open yet at `now`.
     #[must_use]
     pub fn new(now: Instant, config: LineConfig) -> Self {
+        let config = config.bounded();
         let mut master = Self {
             exchange: config.machine(),
             schedule: Schedule::new(Rules { limit: config.queue_limit, aging: AGING }),
@@ -164,6 +165,7 @@ impl<C> Master<C> {
 
     /// Sets what is special about one slave.
     pub fn configure_slave(&mut self, slave: u8, settings: SlaveSettings) {
+        let settings = settings.bounded();
         self.config.slaves.insert(slave, settings);
         if let Some(station) = self.stations.get_mut(&slave) {
             station.configure(&self.config, settings);

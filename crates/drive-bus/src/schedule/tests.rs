@@ -95,6 +95,50 @@ fn a_request_that_expires_unsent_has_not_had_its_turn_so_nobody_starves_on_a_lin
     }
 }
 
+/// How often each of three slaves is asked in a minute whose status each wants twice a second and gives up when the next is due, while the
+/// commands of `commanded` others never end. A turn takes 20 ms: they want 12 % of the line.
+fn turns_beside_commands(commanded: u8) -> Vec<u32> {
+    let (mut schedule, start) = (schedule(), Instant::now());
+    let mut turns = vec![0; 3];
+    for turn in 0..3_000 {
+        let now = start + turn * 20 * MS;
+        schedule.expired(now);
+        for slave in 10..10 + commanded {
+            let waits = schedule.any(|entry| entry.slave == slave);
+            if !waits {
+                push(&mut schedule, now, slave, Terms::of(Class::Command), 0);
+            }
+        }
+        for slave in (1..=3).filter(|_| turn % 25 == 0) {
+            push(&mut schedule, now, slave, Terms::of(Class::Status).within(500 * MS), 1);
+        }
+        if let Chosen::Send(entry) =
+            schedule.choose(now, |_| Readiness { at: now, takes: 20 * MS, holds_line: false })
+            && entry.work == 1
+        {
+            turns[usize::from(entry.slave) - 1] += 1;
+        }
+    }
+    turns
+}
+
+#[test]
+fn commands_of_one_slave_or_of_some_that_never_end_keep_nobody_else_from_being_asked() {
+    for commanded in 1..=4 {
+        let turns = turns_beside_commands(commanded);
+        // Each wants 120.
+        assert!(turns.iter().all(|turns| *turns >= 110), "beside {commanded}: {turns:?}");
+    }
+}
+
+#[test]
+fn the_commands_of_a_drive_that_is_started_go_ahead_of_all_polls() {
+    let (mut schedule, now) = (schedule(), Instant::now());
+    (1..=30).for_each(|slave| push(&mut schedule, now, slave, Terms::of(Class::Status), 1));
+    (0..16).for_each(|_| push(&mut schedule, now, 40, Terms::of(Class::Command), 0));
+    assert_eq!(order(&mut schedule, now)[..16], [0; 16]);
+}
+
 #[test]
 fn aging_never_lifts_a_poll_above_a_stop() {
     let (mut schedule, start) = (schedule(), Instant::now());
