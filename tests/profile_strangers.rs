@@ -414,8 +414,7 @@ impl Stage {
         let set = loop {
             let set = self.drive.set_setpoint(Frequency::from_hertz(hertz).into()).await;
             self.note(&format!("{hertz} Hz"), &outcome(&set));
-            // As of a start: an order may expire before its turn.
-            if !set.as_ref().is_err_and(|error| error.kind() == ErrorKind::NotSent) {
+            if !set.as_ref().is_err_and(wrote_nothing) {
                 break set;
             }
             sleep(Duration::from_millis(300)).await;
@@ -426,7 +425,6 @@ impl Stage {
     }
 
     async fn start(&mut self, direction: Direction) {
-        // Behind a lost answer the line keeps a slave's late answers apart, and an order may expire before its turn: nothing was sent.
         for _ in 0..10 {
             let started = self.drive.start(direction).await;
             self.note(&format!("start {direction}"), &outcome(&started));
@@ -435,7 +433,7 @@ impl Stage {
                 self.claim(self.now().running, "a start is confirmed, and its output is off");
                 return;
             }
-            let unsent = started.is_err_and(|error| error.kind() == ErrorKind::NotSent);
+            let unsent = started.as_ref().is_err_and(wrote_nothing);
             assert!(unsent, "{}: {}", self.kind.key, self.told);
             sleep(Duration::from_millis(300)).await;
         }
@@ -598,6 +596,12 @@ impl Stage {
             self.told
         );
     }
+}
+
+/// Behind a lost answer the line keeps a slave's late answers apart: an order may expire before its turn, and what is read before it is written
+/// may be taken for a late answer. Both say so, and may be asked for again.
+fn wrote_nothing(error: &Error) -> bool {
+    matches!(error.kind(), ErrorKind::NotSent | ErrorKind::NoAnswer)
 }
 
 fn outcome<T>(result: &Result<T, Error>) -> String {

@@ -44,10 +44,10 @@ fn at_home_assistant_itself_a_drive_is_commanded_trips_is_lost_and_acknowledged_
     assert!(all.get("sensor.pump_1_power").is_none(), "an Altivar 312 has none: {all:#}");
 
     // A command, and what became of it.
-    home.say("set number.pump_1_setpoint 30");
-    let told = home.wait("sensor.pump_1_last_command", "confirmed");
+    let told = home.command("set number.pump_1_setpoint 30", "pump_1");
     assert_eq!((&told["action"], &told["caller"]), (&json!("setpoint"), &json!("mqtt")), "{told}");
-    home.say("press button.pump_1_start");
+    home.wait("sensor.pump_1_last_command", "confirmed");
+    home.command("press button.pump_1_start", "pump_1");
     home.wait("binary_sensor.pump_1_turning", "on");
     home.wait("sensor.pump_1_frequency", "30.0");
     assert!(daemon.turns());
@@ -55,8 +55,8 @@ fn at_home_assistant_itself_a_drive_is_commanded_trips_is_lost_and_acknowledged_
     home.wait("binary_sensor.pump_1_turning", "off");
     assert!(!daemon.turns());
     // A refusal: 20 to 22 Hz are forbidden to this drive.
-    home.say("set number.pump_1_setpoint 21");
-    let told = home.wait("sensor.pump_1_last_command", "refused");
+    let told = home.command("set number.pump_1_setpoint 21", "pump_1");
+    home.wait("sensor.pump_1_last_command", "refused");
     assert_eq!((&told["action"], &told["reason"]), (&json!("setpoint"), &json!("forbidden_band")), "{told}");
 
     // A trip, and somebody takes note of it.
@@ -85,7 +85,7 @@ fn at_home_assistant_itself_a_drive_is_commanded_trips_is_lost_and_acknowledged_
     assert_eq!(told, ["on"], "{problem:?}");
     // What is kept for good is there before the drive is: a button can be pressed once it answers.
     home.wait("binary_sensor.pump_1_answers", "on");
-    home.say("press button.pump_1_reset_fault");
+    home.command("press button.pump_1_reset_fault", "pump_1");
     home.wait("binary_sensor.pump_1_problem", "off");
     // Its own watchdog may have tripped it once more while nobody was there to feed it.
     home.say("press button.pump_1_acknowledge_alarms");

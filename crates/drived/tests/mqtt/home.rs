@@ -71,6 +71,21 @@ impl HomeAssistant {
         self.say(&format!("wait {entity} {state}"))
     }
 
+    /// Commands a drive, and gives what became of it; once more where that expired before it was sent, as a person does whose disk is
+    /// slow to write the audit log.
+    #[track_caller]
+    pub(crate) fn command(&mut self, line: &str, drive: &str) -> Value {
+        let last = format!("sensor.{drive}_last_command");
+        loop {
+            let before = self.entity(&last)["attributes"]["arrived_unix_ms"].to_string();
+            self.say(line);
+            let told = self.say(&format!("outcome {last} {before}"));
+            if told["outcome"] != "expired" {
+                return told;
+            }
+        }
+    }
+
     /// An entity as it is now: its state, its attributes, and when that was told.
     #[track_caller]
     pub(crate) fn entity(&mut self, entity: &str) -> Value {

@@ -6,6 +6,7 @@ things). Nothing of it is replaced.
 usage: home_assistant.py FOLDER PORT OWN-PORT      the port of the broker, and one for its own server
 
     wait ENTITY STATE     waits until an entity is in this state: its attributes; `-` for none: until there is no such entity
+    outcome ENTITY TIME   waits until a last command came at another time than this and its outcome is known: its attributes
     entity ENTITY         an entity as it is now: state, attributes, and when that came; `-` for none
     states                every entity with its state
     named ENTITY NAME     waits until the device of an entity has this name
@@ -80,15 +81,28 @@ def note(event):
 async def wait(hass, entity, wanted):
     """Until the entity is so; its attributes."""
 
-    def is_so():
-        state = hass.states.get(entity)
+    def is_so(state):
         return state is None if wanted == "-" else state is not None and state.state == wanted
 
+    return await until(hass, entity, is_so, wanted)
+
+
+async def outcome(hass, entity, before):
+    """Until the outcome of another command than that which came then is known; its attributes."""
+
+    def is_known(state):
+        told = state.attributes if state else {}
+        return str(told.get("arrived_unix_ms", before)) != before and told.get("outcome") != "accepted"
+
+    return await until(hass, entity, is_known, f"the outcome of one behind {before}")
+
+
+async def until(hass, entity, is_so, wanted):
     changed = asyncio.Event()
     stop = hass.bus.async_listen(EVENT_STATE_CHANGED, core.callback(lambda _: changed.set()))
     try:
         async with asyncio.timeout(PATIENCE):
-            while not is_so():
+            while not is_so(hass.states.get(entity)):
                 changed.clear()
                 await changed.wait()
     except TimeoutError:
@@ -132,6 +146,8 @@ async def answer(hass, word, words):
     match word, words:
         case "wait", [entity, wanted]:
             return await wait(hass, entity, wanted)
+        case "outcome", [entity, before]:
+            return await outcome(hass, entity, before)
         case "entity", [entity]:
             now = hass.states.get(entity)
             if now is None:
