@@ -53,6 +53,40 @@ fn change_delimiter(to: u8) -> Request<'static> {
     Request::Custom(0x08, Cow::Owned(vec![0, 3, to, 0]))
 }
 
+/// As an adapter does that keeps an answer until the next question: which of them belongs to this question nothing tells.
+#[test]
+fn of_two_answers_that_differ_and_come_together_none_is_believed() {
+    let answers = |first: u8, second: u8| {
+        [
+            frame(1, &Bytes::copy_from_slice(&[3, 4, 0, first, 0, 0]), b'\n'),
+            frame(1, &Bytes::copy_from_slice(&[3, 4, 0, second, 0, 0]), b'\n'),
+        ]
+        .concat()
+    };
+    let mut script = script(Echo::Off);
+    let step = read(&mut script, &answers(7, 8));
+    assert!(
+        matches!(&step, Step::Done(Err(Failure::Mismatch(why))) if why == "two answers that differ"),
+        "{step:?}"
+    );
+    assert_eq!(
+        words(&read(&mut script, &answers(7, 7))),
+        Some(&[7, 0][..]),
+        "what comes twice says one thing"
+    );
+    // An exception says something else, too.
+    let refused = [answers(7, 7), frame(1, &Bytes::copy_from_slice(&[0x83, 2]), b'\n').to_vec()].concat();
+    assert!(matches!(read(&mut script, &refused), Step::Done(Err(Failure::Mismatch(_)))));
+    // The answer of another slave, or to another question, belongs to nobody's question here.
+    let others = [
+        answers(7, 7),
+        frame(2, &Bytes::copy_from_slice(&[3, 4, 0, 9, 0, 0]), b'\n').to_vec(),
+        frame(1, &Bytes::copy_from_slice(&[6, 0, 1, 0, 2]), b'\n').to_vec(),
+    ]
+    .concat();
+    assert_eq!(words(&read(&mut script, &others)), Some(&[7, 0][..]));
+}
+
 #[test]
 fn the_manuals_frame_goes_both_ways_whole_byte_by_byte_and_twice_in_a_row() {
     let mut script = script(Echo::Off);

@@ -29,7 +29,7 @@ use self::{
     frame::{LINE_FEED, MAX_FRAME},
 };
 use super::{
-    Failure, Frame, Machine, Step, Stray,
+    DIFFER, Failure, Frame, Machine, Step, Stray,
     echo::{Echo, EchoState, MAYBE_ECHO},
     pace::Pace,
 };
@@ -79,6 +79,24 @@ pub struct Ascii {
     strays: Vec<Stray>,
     /// The answer that came last.
     taken: Option<Frame>,
+    /// What it answers, and what it says, while what came together with it is looked at.
+    answered: Option<Answered>,
+}
+
+/// A question and its answer.
+#[derive(Debug)]
+struct Answered {
+    slave: u8,
+    request: Arc<Request<'static>>,
+    pdu: Bytes,
+}
+
+impl Answered {
+    /// Whether a frame answers the same question otherwise, so that none can be told to be the right one.
+    fn is_contradicted(&self, heard: &Heard) -> bool {
+        let Heard::Frame { slave, pdu } = heard else { return false };
+        *slave == self.slave && *pdu != self.pdu && answer::check(&self.request, pdu.clone()).is_ok()
+    }
 }
 
 #[derive(Debug)]
@@ -116,6 +134,7 @@ impl Ascii {
             last_character: None,
             strays: Vec::new(),
             taken: None,
+            answered: None,
         }
     }
 
@@ -158,9 +177,10 @@ impl Ascii {
             self.strays.push(Stray::Early { slave, frame });
             return Step::More;
         }
-        match answer::check(&current.request, pdu) {
+        match answer::check(&current.request, pdu.clone()) {
             Ok(answer) => {
                 self.taken = Some(frame);
+                self.answered = Some(Answered { slave, request: Arc::clone(&current.request), pdu });
                 if self.echo == EchoState::Unknown && !current.disturbed {
                     self.echo = EchoState::Absent;
                 }
@@ -273,9 +293,13 @@ impl Machine for Ascii {
     fn handle_bytes(&mut self, now: Instant, bytes: &[u8]) -> Step {
         self.last_character = Some(now);
         let mut step = Step::More;
+        self.answered = None;
         for &character in bytes {
             if let Some(heard) = self.receiver.hear(character) {
                 self.count_noise();
+                if self.answered.as_ref().is_some_and(|answered| answered.is_contradicted(&heard)) {
+                    step = Step::Done(Err(Failure::Mismatch(DIFFER.to_owned())));
+                }
                 // After the answer nothing more is expected: what follows it is stray.
                 let next = self.act(now, heard);
                 step = if step == Step::More { next } else { step };

@@ -27,6 +27,9 @@ const CHECK: Crc<u16> = Crc::<u16>::new(&CRC_16_MODBUS);
 /// Exception 0Bh, gateway target device failed to respond (Modbus Application Protocol V1.1b3, section 7).
 pub(crate) const NOBODY_ANSWERED: u8 = 0x0B;
 
+/// Why none of two answers is believed that differ and come together: which of them is the right one nothing tells.
+pub(crate) const DIFFER: &str = "two answers that differ";
+
 /// What a slave said: data, or its refusal.
 pub type Answer = Result<Response, ExceptionCode>;
 

@@ -10,7 +10,7 @@ use super::{
 use crate::{
     answer::{self, Extent},
     exchange::{
-        Failure, Frame, Step, Stray,
+        DIFFER, Failure, Frame, Step, Stray,
         echo::{Echo, EchoState, MAYBE_ECHO},
     },
     shape::Shape,
@@ -81,7 +81,7 @@ impl Rtu {
                 if crate::mutant!("two-answers-believed", self.another_follows(&pdu), false) {
                     self.judge(self.received.len());
                     self.current = None;
-                    return Some(Step::Done(Err(Failure::Mismatch("two answers that differ".to_owned()))));
+                    return Some(Step::Done(Err(Failure::Mismatch(DIFFER.to_owned()))));
                 }
                 if came_first && !equals && self.may_be_silent() {
                     self.echo = EchoState::Absent;
