@@ -247,6 +247,22 @@ async fn a_drive_that_answers_and_runs_by_its_panel_is_not_waited_for_as_one_tha
     }
 }
 
+/// Its run command does not read back, and its panel lets the motor come down, as it does too where it turns it round.
+#[tokio::test(start_paused = true)]
+async fn what_a_panel_lets_a_motor_do_shows_no_withdrawal() {
+    let mut rig = running("goodrive").await;
+    rig.machine.panel(drive_sim::Panel::TakeControl);
+    rig.machine.panel(drive_sim::Panel::Run);
+    rig.drive.status().await.expect("it answers");
+    rig.machine.panel(drive_sim::Panel::Stop);
+    let error = rig.drive.withdraw().await.expect_err("the panel has it");
+    assert_eq!(error.kind(), ErrorKind::NotConfirmed, "{error}");
+    assert!(rig.drive.lease().is_some(), "it may stand, and act when the panel gives control back");
+    rig.machine.panel(drive_sim::Panel::ReleaseControl);
+    rig.drive.withdraw().await.expect("the bus has it");
+    assert!(rig.drive.lease().is_none());
+}
+
 #[tokio::test(start_paused = true)]
 async fn it_trips_and_is_reset_and_nothing_starts_by_itself() {
     for key in DRIVEN {

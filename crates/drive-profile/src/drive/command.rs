@@ -295,8 +295,11 @@ impl<P: Port> ProfileDrive<P> {
             // Where the command reads back, that it holds no run word is seen whoever runs the motor.
             let held = self.watch.run.held();
             let is_gone = held.map(|held| !self.is_run(held));
+            // Where it does not, the motor shows it, unless somebody else has it: what that one lets it do, such as turn round, is not by the
+            // word that was written.
+            let is_others = status.control == Some(Control::Local);
             let stands = !matches!(status.state, State::Running | State::Unknown);
-            if is_gone.unwrap_or_else(|| stands || comes_down(&status, first)) {
+            if is_gone.unwrap_or_else(|| !is_others && (stands || comes_down(&status, first))) {
                 self.watch.run.end();
                 return Ok(Withdrawn::Ended(Status { verdict: None, ..status }));
             }
