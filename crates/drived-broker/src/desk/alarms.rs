@@ -1,5 +1,7 @@
 //! What is asked to be done with alarms: taken by the same desk as commands, and for as long.
 
+use std::time::Duration;
+
 use tokio::time::Instant;
 
 use super::{
@@ -44,7 +46,7 @@ impl<A: Answers + Sync> Desk<A> {
         let judged = match doubt.or(closing) {
             Some(doubt) => Err(doubt),
             None => asked.map_err(Refusal::from).and_then(|asked| {
-                judge_time([sent_unix_ms, issued_unix_ms], arrived, LIFETIME).map(|_| asked)
+                judge_time([sent_unix_ms, issued_unix_ms], arrived, LIFETIME, Duration::ZERO).map(|_| asked)
             }),
         };
         let order = match judged {

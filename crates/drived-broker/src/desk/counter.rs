@@ -63,6 +63,10 @@ impl Counter {
         self.plant.as_it_is(target)
     }
 
+    pub(super) fn clock_set_back(&self) -> Duration {
+        self.plant.clock_set_back()
+    }
+
     /// Stops at once: no disk and no other command holds it up.
     pub(super) fn stop(&self, caller: &Caller, request: Request, record: Record, answers: &impl Answers) {
         self.audit.record(record.clone()).whenever();

@@ -189,7 +189,12 @@ impl<A: Answers + Sync> Desk<A> {
             (false, longest) => longest.unwrap_or(message.lifetime),
         };
         // Its time has run since it was sent; and the same command is the same again, whenever it comes.
-        let age = judge_time([message.sent_unix_ms, issued_unix_ms], message.arrived, request.lifetime)?;
+        let age = judge_time(
+            [message.sent_unix_ms, issued_unix_ms],
+            message.arrived,
+            request.lifetime,
+            self.counter.clock_set_back(),
+        )?;
         request.arrived = request.arrived.checked_sub(age).unwrap_or(request.arrived);
         // While it waits for the audit log, the name may become another motor's.
         request.expects = request.expects.or_else(|| self.counter.as_it_is(&request.target));
@@ -206,11 +211,21 @@ impl<A: Answers + Sync> Desk<A> {
     }
 }
 
-/// How old a message is that says when it was sent, within its lifetime.
-fn judge_time(sent: [Option<u64>; 2], arrived: Instant, lifetime: Duration) -> Result<Duration, Refusal> {
+/// How old a message is that says when it was sent, within its lifetime. Where this computer's clock was set back since, it may be older by
+/// that.
+fn judge_time(
+    sent: [Option<u64>; 2],
+    arrived: Instant,
+    lifetime: Duration,
+    set_back: Duration,
+) -> Result<Duration, Refusal> {
     let Some(sent) = sent.into_iter().flatten().min() else { return Ok(Duration::ZERO) };
     let age = drive_fleet::mutant!("old-command-moves", age(sent, arrived)?, Duration::ZERO);
-    if age >= lifetime { Err(Refusal::Expired { age, lifetime }) } else { Ok(age) }
+    match age {
+        age if age >= lifetime => Err(Refusal::Expired { age, lifetime }),
+        age if age + set_back >= lifetime => Err(Refusal::ClockSetBack(set_back)),
+        age => Ok(age),
+    }
 }
 
 /// How old something is that was sent then, by a clock that may differ.
@@ -221,4 +236,21 @@ fn age(sent_unix_ms: u64, arrived: Instant) -> Result<Duration, Refusal> {
         return Err(Refusal::malformed(format!("it was sent {ahead} ms in the future: the clocks differ")));
     }
     Ok(Duration::from_millis(now.saturating_sub(sent_unix_ms)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn what_says_when_it_was_sent_may_be_older_by_what_the_clock_was_set_back() {
+        let (now, second) = (Instant::now(), Duration::from_secs(1));
+        let judge = |age: u64, set_back| judge_time([None, Some(unix(now) - age)], now, second, set_back);
+        assert!(judge(100, Duration::ZERO).is_ok_and(|age| age < second));
+        assert!(judge(100, Duration::from_millis(300)).is_ok());
+        assert!(matches!(judge(100, Duration::from_secs(5)), Err(Refusal::ClockSetBack(_))));
+        assert!(matches!(judge(5_000, Duration::from_secs(5)), Err(Refusal::Expired { .. })));
+        // What says nothing of when it was sent has another proof of its age.
+        assert!(judge_time([None, None], now, second, Duration::from_secs(5)).is_ok());
+    }
 }

@@ -21,6 +21,11 @@ pub enum Refusal {
     Retained,
     #[error("the connection to the broker has stalled, and nobody can say how old it is")]
     Late,
+    #[error(
+        "the clock of this computer was set back by {:.1} s a moment ago, and nobody can say how old it is",
+        .0.as_secs_f64()
+    )]
+    ClockSetBack(Duration),
     #[error("the births have not been told: nobody can know what it writes")]
     NotBorn,
     #[error("nobody can say which drive is meant: {0}")]
@@ -58,7 +63,7 @@ impl Refusal {
             Self::NotFound => "not_found",
             Self::ReadOnly(_) => "read_only",
             Self::Retained => "retained",
-            Self::Late => "late",
+            Self::Late | Self::ClockSetBack(_) => "late",
             Self::NotBorn => "not_born",
             Self::NamesLost(_) => "names_lost",
             Self::Closing => "closing",

@@ -23,6 +23,7 @@ use std::{
     collections::HashMap,
     env,
     sync::{Arc, OnceLock, PoisonError, RwLock},
+    time::Duration,
 };
 
 use drive_bus::Line;
@@ -97,6 +98,12 @@ struct Inner {
 }
 
 impl Plant {
+    /// By how much the clock of this computer was set back within the last minute: by so much more may a message be old that says when it was
+    /// sent.
+    pub fn clock_set_back(&self) -> Duration {
+        self.0.pulse.set_back()
+    }
+
     /// A plant whose alarms live as long as the program.
     pub fn start(fleet: Fleet, groups: Vec<Group>, demo: bool) -> Self {
         Self::start_with(fleet, groups, demo, &KeptAlarms::default(), Watched::default())

@@ -1,8 +1,9 @@
 //! Whether the program stood still, as in a machine that was paused: what it reads behind that may have lain in a socket all the while.
+//! And whether the wall's clock was set back, behind which what was sent before looks younger than it is.
 
 use std::{
     sync::{Mutex, PoisonError, Weak},
-    time::Duration,
+    time::{Duration, Instant as Steady, SystemTime},
 };
 
 use tokio::time::{Instant, MissedTickBehavior, interval};
@@ -16,10 +17,16 @@ const STOOD: Duration = Duration::from_millis(1_500);
 /// Within this, what had come meanwhile is read.
 const BEHIND: Duration = Duration::from_millis(500);
 
+/// A clock that goes slower for a while, so as not to be set, loses less between two beats.
+const STEP: Duration = Duration::from_millis(100);
+/// Longer than a message lies in a broker that goes on.
+const LIES: Duration = Duration::from_secs(60);
+
 /// The beats of the program.
 pub(super) struct Pulse(Mutex<Beats>);
 
 struct Beats {
+    wall: Wall,
     last: Instant,
     /// From when to when it stood still last.
     stood: Option<(Instant, Instant)>,
@@ -27,11 +34,12 @@ struct Beats {
 
 impl Pulse {
     pub(super) fn new() -> Self {
-        Self(Mutex::new(Beats { last: Instant::now(), stood: None }))
+        Self(Mutex::new(Beats { wall: Wall::new(), last: Instant::now(), stood: None }))
     }
 
     fn beat(&self) {
         let mut beats = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        beats.wall.look((SystemTime::now(), Steady::now()));
         let now = Instant::now();
         if now > beats.last + STOOD {
             beats.stood = Some((beats.last, now));
@@ -44,6 +52,12 @@ impl Pulse {
         beats.last = now;
     }
 
+    /// By how much the wall's clock was set back lately: by so much more may whatever says when it was sent be old.
+    pub(super) fn set_back(&self) -> Duration {
+        let mut beats = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        beats.wall.look((SystemTime::now(), Steady::now()))
+    }
+
     /// When what was read at this moment was asked at the earliest.
     pub(super) fn asked_after(&self, read: Instant) -> Instant {
         let beats = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -52,6 +66,36 @@ impl Pulse {
             Some((since, until)) if since < read && read < until + BEHIND => since,
             _ => read,
         }
+    }
+}
+
+/// The wall's clock beside one that nobody sets.
+struct Wall {
+    last: (SystemTime, Steady),
+    /// When it was set back, and by how much, lately.
+    back: Option<(Steady, Duration)>,
+}
+
+impl Wall {
+    fn new() -> Self {
+        Self { last: (SystemTime::now(), Steady::now()), back: None }
+    }
+
+    /// Looks at both, and tells by how much it was set back lately, all steps together.
+    fn look(&mut self, now: (SystemTime, Steady)) -> Duration {
+        self.back.take_if(|(at, _)| now.1 > *at + LIES);
+        let expected = self.last.0 + now.1.saturating_duration_since(self.last.1);
+        let by = expected.duration_since(now.0).unwrap_or_default();
+        let so_far = self.back.map_or(Duration::ZERO, |(_, by)| by);
+        if by >= STEP {
+            tracing::warn!(
+                "the clock of this computer was set back by {:.1} s: what says when it was sent is taken to be older by that for a minute",
+                by.as_secs_f64()
+            );
+            self.back = Some((now.1, so_far + by));
+        }
+        self.last = now;
+        self.back.map_or(Duration::ZERO, |(_, by)| by)
     }
 }
 
@@ -77,6 +121,25 @@ mod tests {
         testing::TestPlant,
     };
     use drived_config::rights::{Caller, Rights};
+
+    #[test]
+    fn a_clock_that_is_set_back_is_known_for_a_minute_and_one_that_is_set_forward_or_goes_slower_is_none() {
+        let mut wall = super::Wall::new();
+        let (mut time, mut steady) = wall.last;
+        let mut pass = |wall: &mut super::Wall, all: u64, shown: i64| {
+            steady += Duration::from_millis(all);
+            let by = Duration::from_millis(shown.unsigned_abs());
+            time = if shown < 0 { time - by } else { time + by };
+            wall.look((time, steady))
+        };
+        assert_eq!(pass(&mut wall, 250, 250), Duration::ZERO);
+        assert_eq!(pass(&mut wall, 250, 240), Duration::ZERO, "it goes slower");
+        assert_eq!(pass(&mut wall, 250, 3_600_000), Duration::ZERO, "it is set forward");
+        assert_eq!(pass(&mut wall, 250, -4_750), Duration::from_secs(5));
+        assert_eq!(pass(&mut wall, 30_000, 30_000), Duration::from_secs(5));
+        assert_eq!(pass(&mut wall, 250, -750), Duration::from_secs(6), "both together");
+        assert_eq!(pass(&mut wall, 60_001, 60_001), Duration::ZERO);
+    }
 
     #[tokio::test(start_paused = true)]
     async fn what_was_asked_while_the_program_stood_still_is_not_begun_and_least_of_all_behind_a_stop() {
