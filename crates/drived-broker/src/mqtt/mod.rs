@@ -59,7 +59,7 @@ struct Face {
     config: MqttConfig,
     topics: Topics,
     broker: Broker,
-    /// By which a daemon that tells under the same base is known for another.
+    /// Where it is, for whoever is told of two under one base.
     host: Option<String>,
     instance: String,
     /// The newest line of the audit log.
