@@ -551,3 +551,5 @@ fn taken(leavings: &mut Leavings, kept: &Kept, plant: &Plant, place: &str, name:
 
 #[cfg(test)]
 mod tests;
+        // Whoever comes to a place has what was kept there: it is nobody's no more.
+        kept.runs.call(place, name);

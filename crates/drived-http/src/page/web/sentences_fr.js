@@ -49,6 +49,7 @@ export const SENTENCES_FR = {
   'have it done, and say so: drived alarms done NUMBER': 'faites-le faire, et dites-le : drived alarms done NUMÉRO',
   'drived doctor says more': 'drived doctor en dit davantage',
   'see whether its disk is full; the log of the program says why': 'voir si son disque est plein ; le journal du programme dit pourquoi',
+  'see whether the motor turns; once its drive is in the configuration again, the stop is given anew': 'voir si le moteur tourne ; dès que son variateur est de nouveau dans la configuration, l’arrêt est redonné',
   'see what is said of it, mend the file, and read it again': 'voir ce qui en est dit, corriger le fichier et le relire',
   'look at its supply, its address and its cable': 'vérifier son alimentation, son adresse et son câble',
 
