@@ -673,7 +673,7 @@ async fn a_flood_of_commands_and_garbage_fills_no_queue_and_a_stop_gets_through(
 #[tokio::test(start_paused = true)]
 async fn commands_wait_for_no_broker_and_the_daemon_ends_with_offline() {
     let bench = Bench::of(1).await;
-    bench.mqtt.closing();
+    bench.plant.plant.close();
     bench.command(&start("late"));
     a_while().await;
     assert_eq!((bench.runs(0), &bench.answers()[0]["reason"]), (false, &"closing".into()));

@@ -23,6 +23,7 @@ export const SENTENCES_FR = {
   'a later command took its place before it was sent': 'un ordre ultérieur l’a remplacé avant son envoi',
   'it was withdrawn before it was sent': 'il a été retiré avant son envoi',
   'too many commands for this drive wait': 'trop d’ordres attendent pour ce variateur',
+  'the daemon is about to end: until it has, only stops are carried out': 'le service est sur le point de s’arrêter : d’ici là, seuls les arrêts sont exécutés',
   'the fleet has shut down': 'le service est arrêté',
   'no run command of this side stood any more': 'aucun ordre de marche de ce côté n’était plus donné',
   'its time was over before it was sent: it never will be': 'son délai est passé avant l’envoi : il ne sera jamais envoyé',
@@ -48,8 +49,8 @@ export const SENTENCES_FR = {
   'look at the motors, then at the cable of the line and at the supply of its drives': 'regarder les moteurs, puis le câble de la ligne et l’alimentation de ses variateurs',
   'have it done, and say so: drived alarms done NUMBER': 'faites-le faire, et dites-le : drived alarms done NUMÉRO',
   'drived doctor says more': 'drived doctor en dit davantage',
-  'see whether its disk is full; the log of the program says why': 'voir si son disque est plein ; le journal du programme dit pourquoi',
   'see whether the motor turns; once its drive is in the configuration again, the stop is given anew': 'voir si le moteur tourne ; dès que son variateur est de nouveau dans la configuration, l’arrêt est redonné',
+  'see whether its disk is full; the log of the program says why': 'voir si son disque est plein ; le journal du programme dit pourquoi',
   'see what is said of it, mend the file, and read it again': 'voir ce qui en est dit, corriger le fichier et le relire',
   'look at its supply, its address and its cable': 'vérifier son alimentation, son adresse et son câble',
 
