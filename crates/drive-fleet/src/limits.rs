@@ -98,9 +98,9 @@ pub enum LimitProblem {
     TooFast {
         /// What was asked for.
         asked: Frequency,
-        /// The lowest that is allowed now.
+        /// The lowest that is allowed now, by the other limits too; above the highest where nothing is.
         low: Frequency,
-        /// The highest that is allowed now.
+        /// The highest that is allowed now, by the other limits too.
         high: Frequency,
     },
     /// The limits are in hertz and the setpoint in rpm: it cannot be checked.
@@ -125,7 +125,11 @@ impl fmt::Display for LimitProblem {
                 write!(f, "{asked} is in the forbidden band {} to {}", band.low, band.high)
             }
             Self::TooFast { asked, low, high } => {
-                write!(f, "{asked} is too far from the last setpoint: {low} to {high} is allowed now")
+                write!(f, "{asked} is too far from the last setpoint: ")?;
+                match low <= high {
+                    true => write!(f, "{low} to {high} is allowed now"),
+                    false => f.write_str("nothing within the limits is near enough yet"),
+                }
             }
             Self::NotInHertz => f.write_str("the limits are in hertz, give the setpoint in hertz"),
             Self::UnknownSetpoint => f.write_str("the drive has limits: give the setpoint with the start"),
@@ -204,7 +208,26 @@ impl FrequencyLimits {
         let step = change(rate, now.saturating_duration_since(at));
         let low = Frequency::from_centihertz(from.centihertz().saturating_sub(step));
         let high = Frequency::from_centihertz(from.centihertz().saturating_add(step));
-        if (low..=high).contains(&asked) { Ok(()) } else { Err(LimitProblem::TooFast { asked, low, high }) }
+        if (low..=high).contains(&asked) {
+            return Ok(());
+        }
+        let (low, high) = self.allowed_of(low, high);
+        Err(LimitProblem::TooFast { asked, low, high })
+    }
+
+    /// What the other limits leave of a range, from its lowest to its highest; nothing where that is above this.
+    fn allowed_of(&self, low: Frequency, high: Frequency) -> (Frequency, Frequency) {
+        let mut low = self.low.map_or(low, |lowest| low.max(lowest));
+        let mut high = self.high.map_or(high, |highest| high.min(highest));
+        let band_of =
+            |asked: Frequency| self.forbidden.iter().find(|band| band.low < asked && asked < band.high);
+        while let Some(band) = band_of(low) {
+            low = band.high;
+        }
+        while let Some(band) = band_of(high) {
+            high = band.low;
+        }
+        (low, high)
     }
 }
 
@@ -252,6 +275,34 @@ mod tests {
             Err(LimitProblem::TooFast { asked: hertz(40), low: hertz(25), high: hertz(35) })
         );
         assert_eq!(limits().allow(at + 2 * second, asked, last), Ok(()));
+    }
+
+    #[test]
+    fn what_is_told_to_be_allowed_now_would_be_accepted_now() {
+        let (at, second) = (Instant::now(), Duration::from_secs(1));
+        // From 10 to 50 Hz, but 20 to 22 Hz, by 5 Hz a second.
+        for (last, asked, expected) in [
+            (48, 40, (43, 50)),
+            (12, 18, (10, 17)),
+            (16, 30, (11, 20)),
+            (26, 40, (22, 31)),
+            (50, 10, (45, 50)),
+        ] {
+            let last = Some(Given { setpoint: hertz(last).into(), at });
+            let told = limits().allow(at + second, hertz(asked).into(), last);
+            let (low, high) = (hertz(expected.0), hertz(expected.1));
+            assert_eq!(told, Err(LimitProblem::TooFast { asked: hertz(asked), low, high }));
+            for edge in [low, high] {
+                assert_eq!(limits().allow(at + second, edge.into(), last), Ok(()), "{edge}");
+            }
+        }
+        // Limits that were set since: what is near enough is above them.
+        let last = Some(Given { setpoint: hertz(60).into(), at });
+        let told = limits().allow(at + second, hertz(40).into(), last).unwrap_err().to_string();
+        assert_eq!(
+            told,
+            "40.00 Hz is too far from the last setpoint: nothing within the limits is near enough yet"
+        );
     }
 
     #[test]

@@ -131,11 +131,6 @@ impl Open for Told {
         self.sparkplug.iter().for_each(|sparkplug| sparkplug.collect(samples));
     }
 
-    fn closing(&self) {
-        self.mqtt.closing();
-        self.sparkplug.iter().for_each(Sparkplug::closing);
-    }
-
     fn close(self: Box<Self>) -> Pin<Box<dyn Future<Output = ()> + Send>> {
         Box::pin(async move {
             let sparkplug = OptionFuture::from(self.sparkplug.map(Sparkplug::close));

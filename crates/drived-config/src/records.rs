@@ -173,6 +173,15 @@ impl<T: Record> Records<T> {
         self.lock().drives.iter().filter_map(there).collect()
     }
 
+    /// The stops that were not confirmed, of drives that are not in the configuration: by their places, which drive each is of.
+    pub fn stops_left(&self) -> BTreeMap<String, String> {
+        let left = |(key, entry): (&String, &Entry<T>)| {
+            let of = entry.name.as_ref().map_or_else(|| key.clone(), |name| format!("{name} ({key})"));
+            (entry.is_alone && entry.record.stops()).then(|| (key.clone(), of))
+        };
+        self.lock().drives.iter().filter_map(left).collect()
+    }
+
     /// Has this be the record of the drive at a place, which is called so now. Gives whether the file is to be written for it.
     pub fn set(&self, place: &str, drive: &str, record: Option<T>) -> bool {
         let mut inner = self.lock();

@@ -163,9 +163,6 @@ pub trait Open: Send + Sync {
     /// Says in the log what it has counted: somebody has asked by a signal.
     fn tell(&self) {}
 
-    /// The end has begun: nothing but stops is taken from now on. What becomes of the motors is told until [`Self::close`].
-    fn closing(&self);
-
     /// Ends it, with a goodbye where there is one. It takes a few seconds at most, however the other side is.
     fn close(self: Box<Self>) -> Pin<Box<dyn Future<Output = ()> + Send>>;
 }

@@ -91,13 +91,8 @@ impl Open for Gateways {
         }
     }
 
-    /// A SCADA sees at once that the daemon ends: its other ways to the drives are its own.
-    fn closing(&self) {
-        self.end.send_replace(true);
-    }
-
     fn close(self: Box<Self>) -> Pin<Box<dyn Future<Output = ()> + Send>> {
-        self.closing();
+        self.end.send_replace(true);
         Box::pin(async move {
             for door in self.doors {
                 // One that has failed is closed too.

@@ -200,8 +200,6 @@ impl Recorder {
 
 impl Open for Recorder {
     /// It goes on: what becomes of the motors is what somebody will ask for.
-    fn closing(&self) {}
-
     fn close(self: Box<Self>) -> Pin<Box<dyn Future<Output = ()> + Send>> {
         Box::pin(async move {
             let Some(Recording { plant, listening, tasks, inbox, writing }) = self.0 else { return };

@@ -216,8 +216,6 @@ impl Open for Webhooks {
     }
 
     /// What becomes of the motors is told until [`Self::close`].
-    fn closing(&self) {}
-
     fn close(self: Box<Self>) -> Pin<Box<dyn Future<Output = ()> + Send>> {
         Box::pin(async move {
             self.hearing.abort();

@@ -382,3 +382,49 @@ fn what_a_run_leaves_in_its_state_folder_is_what_the_readme_lists() {
         assert!(left.iter().any(|name| name == kept), "{kept}: {left:?}");
     }
 }
+
+#[test]
+fn a_stop_whose_drive_is_not_in_the_configuration_any_more_is_an_alarm_until_it_is_there_again() {
+    let plant = with_a_stop_pending("kept-left");
+    let text = fs::read_to_string(plant.file.path()).expect("it is there");
+    let without = text.replace(&table("atv312@1", "north"), "");
+    assert_ne!(without, text);
+    fs::write(plant.file.path(), &without).expect("it can be written");
+    let alarms = || -> serde_json::Value {
+        let told = run(&["alarms", "list", "--json", "--socket", &plant.socket]);
+        let told: serde_json::Value = serde_json::from_str(told.assert_done()).expect("it is JSON");
+        told["alarms"].clone()
+    };
+    // Of the program and of nothing else: the other motor is somebody else's.
+    let left =
+        || alarms().as_array().and_then(|all| all.iter().find(|alarm| alarm["kind"] == "stop_left").cloned());
+    let mut ids = Vec::new();
+    for _ in 0..2 {
+        let mut daemon = plant.daemon();
+        daemon.wait_for(r#""event":"identified""#);
+        let alarm = loop {
+            match left() {
+                Some(alarm) => break alarm,
+                None => assert!(!daemon.has_ended()),
+            }
+        };
+        assert_eq!(alarm["state"], "unacknowledged", "{alarm}");
+        assert!(alarm["text"].as_str().is_some_and(|text| text.contains("north (")), "{alarm}");
+        ids.push((alarm["id"].clone(), alarm["count"].clone()));
+        let (code, rest) = daemon.interrupt();
+        assert_eq!(code, Some(1), "the other motor turns on: {rest}");
+    }
+    assert_eq!(ids[0], ids[1], "it is the same behind a restart");
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"identified""#);
+    run(&["alarms", "acknowledge", "--all", "--socket", &plant.socket]).assert_done();
+    assert_eq!(left().map(|alarm| alarm["state"].clone()), Some("acknowledged".into()));
+    fs::write(plant.file.path(), &text).expect("it can be written");
+    daemon.signal("-HUP");
+    let confirmed = daemon.wait_for(r#""event":"stop_confirmed""#);
+    assert!(confirmed.contains("\"north\""), "{confirmed}");
+    while left().is_some() {
+        assert!(!daemon.has_ended());
+    }
+    let _ = daemon.interrupt();
+}

@@ -69,8 +69,6 @@ impl Configured for Receiver {
 struct Posting(JoinHandle<()>);
 
 impl Open for Posting {
-    fn closing(&self) {}
-
     /// The fleet's last words are posted, if somebody takes them.
     fn close(mut self: Box<Self>) -> Pin<Box<dyn Future<Output = ()> + Send>> {
         Box::pin(async move {

@@ -145,10 +145,15 @@ impl Look {
         }
     }
 
-    /// At the program, with what is wrong with it, in words. What is not there is not so.
+    /// At the program, with what is wrong with it, in words, and with the stops that are nobody's: of which drive, by its place. What is
+    /// not there is not so.
     #[must_use]
-    pub fn at_program(wrong: &BTreeMap<AlarmKind, String>) -> Self {
-        let there = wrong.iter().map(|(kind, why)| condition(*kind, None, Some(why.clone()))).collect();
+    pub fn at_program(wrong: &BTreeMap<AlarmKind, String>, stops_left: &BTreeMap<String, String>) -> Self {
+        let wrong = wrong.iter().map(|(kind, why)| condition(*kind, None, Some(why.clone())));
+        let left = stops_left
+            .iter()
+            .map(|(place, drive)| condition(AlarmKind::StopLeft, Some(place.clone()), Some(drive.clone())));
+        let there = wrong.chain(left).collect();
         Self { drive: None, line: None, there, seen: AlarmKind::all().collect() }
     }
 }

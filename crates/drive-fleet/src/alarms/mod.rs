@@ -56,13 +56,13 @@ const GONE_AFTER: u64 = 10_000;
 /// // Of a drive it is `Look::at_drive`, of a line `Look::at_line`.
 /// let full = BTreeMap::from([(AlarmKind::AuditLog, "no space left on device".to_owned())]);
 /// let mut alarms = Alarms::default();
-/// alarms.look(&[Look::at_program(&full)], 1_000);
+/// alarms.look(&[Look::at_program(&full, &BTreeMap::new())], 1_000);
 /// let id = alarms.all()[0].id;
 ///
 /// // It is over when it is so no more, and somebody has taken note of it: in either order.
 /// alarms.acknowledge(id, "Anna", Some("disk ordered"), 2_000)?;
 /// assert!(alarms.all()[0].is_active());
-/// alarms.look(&[Look::at_program(&BTreeMap::new())], 3_000);
+/// alarms.look(&[Look::at_program(&BTreeMap::new(), &BTreeMap::new())], 3_000);
 /// assert!(alarms.all().is_empty());
 /// # Ok::<(), drive_fleet::alarms::AlarmRefused>(())
 /// ```

@@ -21,6 +21,8 @@ pub enum AlarmKind {
     Drive(ConcernKind),
     /// A line has found something wrong with itself, or with a drive on it, by what it has heard.
     LineFinding,
+    /// A stop that was not confirmed is kept of a drive that is not in the configuration: nobody gives it.
+    StopLeft,
     /// The audit log cannot be written, so that only stops are carried out.
     AuditLog,
     /// The history cannot be written: what happens now is not known later.
@@ -32,10 +34,11 @@ pub enum AlarmKind {
 }
 
 /// Those that are of no drive's own.
-const OTHERS: [AlarmKind; 7] = [
+const OTHERS: [AlarmKind; 8] = [
     AlarmKind::LineAway,
     AlarmKind::LineSilent,
     AlarmKind::LineFinding,
+    AlarmKind::StopLeft,
     AlarmKind::AuditLog,
     AlarmKind::History,
     AlarmKind::Maintenance,
@@ -82,6 +85,12 @@ impl AlarmKind {
                 "the line is not as it should be",
                 Severity::Warning,
                 "drived doctor says more",
+            ),
+            Self::StopLeft => row(
+                "stop_left",
+                "a stop was not confirmed, and nobody gives it, for its drive is not in the configuration: the motor may turn",
+                Severity::Alarm,
+                "see whether the motor turns; once its drive is in the configuration again, the stop is given anew",
             ),
             Self::AuditLog => row(
                 "audit_log",
@@ -155,6 +164,7 @@ impl AlarmKind {
     pub const fn is_of_motion(self) -> bool {
         match self {
             Self::Drive(kind) => kind.wakes(),
+            Self::StopLeft => true,
             _ => false,
         }
     }

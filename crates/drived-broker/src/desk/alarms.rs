@@ -42,8 +42,7 @@ impl<A: Answers + Sync> Desk<A> {
         let AlarmsSaid { body, id, issued_unix_ms, asked } = said;
         let named = Named { id: id.clone(), ..Named::default() };
         let record = Record { body: Some(body), ..Record::new(Kind::Command, &caller, what) };
-        let closing = self.closing.borrow().then_some(Refusal::Closing);
-        let judged = match doubt.or(closing) {
+        let judged = match doubt {
             Some(doubt) => Err(doubt),
             None => asked.map_err(Refusal::from).and_then(|asked| {
                 judge_time([sent_unix_ms, issued_unix_ms], arrived, LIFETIME, Duration::ZERO).map(|_| asked)

@@ -17,10 +17,7 @@ use std::{collections::HashMap, sync::Arc, time::Duration};
 
 use drive_fleet::StopOrder;
 use serde_json::Value;
-use tokio::{
-    sync::{mpsc, watch},
-    time::Instant,
-};
+use tokio::{sync::mpsc, time::Instant};
 
 pub use self::{
     alarms::AlarmMessage,
@@ -94,7 +91,6 @@ pub struct Message<A> {
 pub struct Desk<A> {
     counter: Arc<Counter>,
     orders: mpsc::Sender<Order<A>>,
-    closing: watch::Receiver<bool>,
     /// How fast each may come.
     paces: HashMap<String, Pace>,
     /// When each target was last stopped so.
@@ -102,12 +98,12 @@ pub struct Desk<A> {
 }
 
 impl<A: Answers + Sync> Desk<A> {
-    /// Takes commands until it is dropped; nothing but stops once it is `closing`.
-    pub fn open(plant: Plant, audit: Audit, closing: watch::Receiver<bool>) -> Self {
+    /// Takes commands until it is dropped.
+    pub fn open(plant: Plant, audit: Audit) -> Self {
         let (orders, waiting) = mpsc::channel(WAITING);
         let counter = Arc::new(Counter::new(plant, audit));
         tokio::spawn(Arc::clone(&counter).work(waiting));
-        Self { counter, orders, closing, paces: HashMap::new(), stopped: HashMap::new() }
+        Self { counter, orders, paces: HashMap::new(), stopped: HashMap::new() }
     }
 
     /// Takes a message.
@@ -170,9 +166,6 @@ impl<A: Answers + Sync> Desk<A> {
     fn judged(&self, message: Message<A>, target: Target, id: Option<String>) -> Result<Request, Refusal> {
         if let Some(doubt) = message.doubt {
             return Err(doubt);
-        }
-        if *self.closing.borrow() {
-            return Err(Refusal::Closing);
         }
         let Said { asked, issued_unix_ms, .. } = message.said;
         let asked = asked?;

@@ -30,8 +30,6 @@ pub enum Refusal {
     NotBorn,
     #[error("nobody can say which drive is meant: {0}")]
     NamesLost(String),
-    #[error("the daemon is about to end")]
-    Closing,
     #[error(transparent)]
     Unclear(#[from] Unclear),
     #[error("it is {} ms old, and was to be carried out within {} ms", .age.as_millis(), .lifetime.as_millis())]
@@ -66,7 +64,6 @@ impl Refusal {
             Self::Late | Self::ClockSetBack(_) => "late",
             Self::NotBorn => "not_born",
             Self::NamesLost(_) => "names_lost",
-            Self::Closing => "closing",
             Self::Unclear(Unclear::Ambiguous(_)) => "ambiguous",
             Self::Unclear(_) => "malformed",
             Self::IdNeeded => "id_needed",

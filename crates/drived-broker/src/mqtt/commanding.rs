@@ -7,7 +7,7 @@ use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use drive_core::{Direction, Setpoint, StopMode};
 use serde_json::{Value, json};
-use tokio::{sync::watch, time::Instant};
+use tokio::time::Instant;
 
 use super::{
     Face,
@@ -57,8 +57,8 @@ struct To {
 }
 
 impl Commanding {
-    pub(super) fn new(face: Arc<Face>, audit: Audit, closing: watch::Receiver<bool>) -> Self {
-        let desk = Desk::open(face.plant.clone(), audit, closing);
+    pub(super) fn new(face: Arc<Face>, audit: Audit) -> Self {
+        let desk = Desk::open(face.plant.clone(), audit);
         Self { face, desk, calls: VecDeque::new(), called: 0, sent_after: None }
     }
 

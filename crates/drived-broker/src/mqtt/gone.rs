@@ -106,11 +106,7 @@ impl Gone {
         self.seen = seen;
         let lives = is_new || !arrived.retain;
         let host = said["host"].as_str();
-        if !lives && host == face.host.as_deref() {
-            // This one, before its restart.
-            return;
-        }
-        // If it is there, it tells so again before that is over.
+        // It may be this one before its restart, and another on this host as well. If it is there, it tells so again before that is over.
         let left = arrived.expires_in_s.map(|seconds| Duration::from_secs(seconds.into()));
         self.from = self.from.max(Instant::now() + left.unwrap_or(face.config.heartbeat * 3) + SETTLED);
         if !lives {

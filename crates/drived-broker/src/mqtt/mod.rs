@@ -59,7 +59,7 @@ struct Face {
     config: MqttConfig,
     topics: Topics,
     broker: Broker,
-    /// By which a daemon that tells under the same base is known for another.
+    /// Where it is, for whoever is told of two under one base.
     host: Option<String>,
     instance: String,
     /// The newest line of the audit log.
@@ -92,7 +92,6 @@ pub struct Prepared {
 /// The open face.
 pub struct Mqtt {
     face: Arc<Face>,
-    closing: watch::Sender<bool>,
     closed: Arc<Notify>,
     /// Gives its events back, so that the connection stands until its end.
     task: JoinHandle<mpsc::Receiver<Event>>,
@@ -111,11 +110,6 @@ impl Mqtt {
             ..options(&config)?
         };
         Ok(Prepared { config, options })
-    }
-
-    /// Nothing but stops is taken from the broker from now on.
-    pub fn closing(&self) {
-        self.closing.send_replace(true);
     }
 
     /// Says goodbye. It takes no longer than [`CLOSED_WITHIN`].
@@ -200,11 +194,10 @@ impl Prepared {
         let audited = audit.head();
         let (host, instance, anew) = (host_name(), instance(), watch::Sender::new(0));
         let face = Arc::new(Face { plant, config, topics, broker, host, instance, audited, anew });
-        let (closing, closes) = watch::channel(false);
-        let commanding = Commanding::new(Arc::clone(&face), audit, closes);
+        let commanding = Commanding::new(Arc::clone(&face), audit);
         let closed = Arc::new(Notify::new());
         let task = tokio::spawn(keep(Arc::clone(&face), events, commanding, Arc::clone(&closed)));
-        Mqtt { face, closing, closed, task }
+        Mqtt { face, closed, task }
     }
 }
 

@@ -9,10 +9,7 @@ use std::time::Duration;
 use drive_core::{Frequency, Setpoint, Speed};
 use drive_sparkplug::{Command, Value, Write, WriteError};
 use serde_json::{Value as Json, json};
-use tokio::{
-    sync::{mpsc, watch},
-    time::Instant,
-};
+use tokio::{sync::mpsc, time::Instant};
 
 use super::metrics::{ALARMS_COMMAND, COMMAND, SETPOINT, SPEED_SETPOINT};
 use crate::{
@@ -55,13 +52,12 @@ impl Commanding {
         config: &SparkplugConfig,
         plant: Plant,
         audit: Audit,
-        closing: watch::Receiver<bool>,
         outcomes: mpsc::Sender<(Option<String>, Json)>,
     ) -> Self {
         let rights = config.commands.map_or(Rights::NONE, Role::rights);
         let origin = format!("sparkplug {}", config.name.group);
         let caller = Caller::new(CALLER, origin, rights);
-        let desk = Desk::open(plant.clone(), audit, closing);
+        let desk = Desk::open(plant.clone(), audit);
         Self { desk, plant, caller, lifetime: config.lifetime, outcomes }
     }
 

@@ -21,7 +21,7 @@ use drive_fleet::{Events, Freshness, Received, Snapshot};
 use drive_sparkplug::{Action, BdSeq, EdgeNode, Event as Heard, Now, Settings};
 use serde_json::Value as Json;
 use tokio::{
-    sync::{mpsc, oneshot, watch},
+    sync::{mpsc, oneshot},
     task::{JoinHandle, block_in_place},
     time::{Instant, MissedTickBehavior, interval, timeout},
 };
@@ -67,7 +67,6 @@ pub struct Prepared {
 /// The open face.
 pub struct Sparkplug {
     broker: Broker,
-    closing: watch::Sender<bool>,
     leave: oneshot::Sender<()>,
     /// `None`: nothing of outages is told.
     historical: Option<Arc<Counts>>,
@@ -108,11 +107,6 @@ impl Sparkplug {
         let subscriptions = node.subscriptions().into_iter().map(subscribe).collect();
         let options = Options { subscriptions, queue: QUEUE, ..options };
         Ok(Prepared { config, options, interval, bd_seq, node })
-    }
-
-    /// Nothing but stops is taken from the broker from now on.
-    pub fn closing(&self) {
-        self.closing.send_replace(true);
     }
 
     /// Says the death of the node, and goodbye. It takes no longer than [`CLOSED_WITHIN`], twice.
@@ -157,11 +151,10 @@ impl Prepared {
             *next.lock().unwrap_or_else(PoisonError::into_inner) = (attempt.number, bd_seq);
             Some(Will { message: message(EdgeNode::will(&name, bd_seq, now())) })
         });
-        let (closing, closes) = watch::channel(false);
         let (outcomes, told) = mpsc::channel(OUTCOMES);
         let (leave, leaves) = oneshot::channel();
         let fleet_events = plant.fleet().events();
-        let commanding = Commanding::new(&config, plant.clone(), audit, closes, outcomes);
+        let commanding = Commanding::new(&config, plant.clone(), audit, outcomes);
         let counts = again.as_ref().map(|_| Arc::<Counts>::default());
         let whom = format!("sparkplug {}/{}", config.name.group, config.name.edge_node);
         let historical = again
@@ -172,7 +165,7 @@ impl Prepared {
         let face =
             Face { plant, node, broker: broker_too, connection: None, commanding, historical, drives, ids };
         let task = tokio::spawn(face.run(events, number, told, fleet_events, leaves, interval));
-        Sparkplug { broker, closing, leave, historical: counts, task }
+        Sparkplug { broker, leave, historical: counts, task }
     }
 }
 

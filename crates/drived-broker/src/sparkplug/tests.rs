@@ -347,7 +347,7 @@ async fn a_stop_that_is_rejected_is_told_under_its_id() {
 #[tokio::test(start_paused = true)]
 async fn while_the_daemon_ends_only_stops_are_taken_and_the_node_dies_last() {
     let bench = Bench::of(1, config("closing")).await;
-    bench.face.closing();
+    bench.plant.plant.close();
     bench.write("pump 1", "Control/Setpoint", Raw::Double(30.0));
     sleep(Duration::from_secs(2)).await;
     let pump = bench.metrics("pump 1");

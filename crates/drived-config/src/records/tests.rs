@@ -90,6 +90,11 @@ fn what_belongs_to_nobody_is_kept_until_the_place_is_there_again() {
     assert_eq!(after.all().len(), 1);
     after.set_all([]);
     assert!(after.write());
+    // Whose stop nobody gives is known, and nothing else that is nobody's.
+    assert_eq!(after.stops_left(), BTreeMap::from([(ONE.to_owned(), format!("north ({ONE})"))]));
+    assert_eq!(before.stops_left(), BTreeMap::new());
+    after.call(ONE, "east");
+    assert_eq!(after.stops_left(), BTreeMap::new());
     // Whoever comes to its place has it.
     assert_eq!(open(&[("east", ONE)]).of(ONE), Some(stop.clone()));
     // Its name is at a place that is new: a stop goes with it, and a run does not.

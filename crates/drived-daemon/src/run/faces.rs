@@ -14,15 +14,10 @@ pub(super) struct Faces(Arc<Inner>);
 
 struct Inner {
     around: Surroundings,
-    state: Mutex<State>,
+    open: Mutex<AreOpen>,
 }
 
-#[derive(Default)]
-struct State {
-    open: Vec<(&'static str, Box<dyn Open>)>,
-    /// The daemon ends: nothing is opened any more.
-    ending: bool,
-}
+type AreOpen = Vec<(&'static str, Box<dyn Open>)>;
 
 /// Faces for which everything has been found.
 pub(super) type Openings = Vec<(&'static str, Opening)>;
@@ -35,52 +30,44 @@ pub(super) fn prepare(config: &Config, wanted: impl Fn(&str) -> bool) -> Result<
 
 impl Faces {
     pub(super) fn open(openings: Openings, around: Surroundings) -> Self {
-        let faces = Self(Arc::new(Inner { around, state: Mutex::default() }));
+        let faces = Self(Arc::new(Inner { around, open: Mutex::default() }));
         faces.open_all(openings);
         faces
     }
 
     fn open_all(&self, openings: Openings) {
-        let mut state = self.state();
-        if !state.ending {
+        let mut are_open = self.are_open();
+        if !self.0.around.plant.is_closing() {
             let open = |(table, opening): (_, Opening)| (table, opening(&self.0.around));
-            state.open.extend(openings.into_iter().map(open));
+            are_open.extend(openings.into_iter().map(open));
         }
     }
 
     /// Closes these faces, and opens others in their places.
     pub(super) async fn exchange(&self, gone: &[&str], openings: Openings) {
-        let closing: Vec<_> = self.state().open.extract_if(.., |(table, _)| gone.contains(table)).collect();
-        closing.iter().for_each(|(_, face)| face.closing());
+        let closing: Vec<_> = self.are_open().extract_if(.., |(table, _)| gone.contains(table)).collect();
         join_all(closing.into_iter().map(|(_, face)| face.close())).await;
         self.open_all(openings);
     }
 
     /// Says in the log what each has counted.
     pub(super) fn tell(&self) {
-        self.state().open.iter().for_each(|(_, face)| face.tell());
+        self.are_open().iter().for_each(|(_, face)| face.tell());
     }
 
-    /// The end has begun.
-    pub(super) fn closing(&self) {
-        let mut state = self.state();
-        state.ending = true;
-        state.open.iter().for_each(|(_, face)| face.closing());
-    }
-
-    /// Ends them all.
+    /// Ends them all, once the [plant is closing](drived_plant::plant::Plant::close).
     pub(super) async fn close(&self) {
-        let open = std::mem::take(&mut self.state().open);
+        let open = std::mem::take(&mut *self.are_open());
         join_all(open.into_iter().map(|(_, face)| face.close())).await;
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
-        self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
+    fn are_open(&self) -> MutexGuard<'_, AreOpen> {
+        self.0.open.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Source for Faces {
     fn collect(&self, samples: &mut Samples) {
-        self.state().open.iter().for_each(|(_, face)| face.collect(samples));
+        self.are_open().iter().for_each(|(_, face)| face.collect(samples));
     }
 }

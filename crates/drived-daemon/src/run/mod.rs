@@ -142,7 +142,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     // Before anything is kept by which a later start sees that there was this one.
     let names = Names::in_folder(config.doors.state.folder.as_deref());
     tell_names(&names, &config.lines, &config.groups);
-    let alarms = KeptAlarms::in_folder(folder, &places);
+    let alarms = KeptAlarms::in_folder(folder, &places).with_stops_of(kept.runs.clone());
     let plant = Plant::start_with(fleet.clone(), config.groups.clone(), false, &alarms, watched);
     plant.set_names(names.clone());
     let watched = plant.keep_watched();
@@ -210,20 +210,21 @@ pub async fn run(args: Args) -> Result<(), Failure> {
             }
         }
     }
+    // Until what becomes of each motor is settled everybody may stop his own, by every door; nothing else is begun any more.
+    plant.close();
     drop(watching);
     findings.abort();
-    // What becomes of the motors is a matter of the exit's policies, and whose they were is kept as it was.
-    silences.abort();
+    // Whose the motors were is kept as it was.
     watched.abort();
     first_hour.cancel();
     // What becomes of the motors is told in words.
     let screen = OptionFuture::from(screen.map(Screen::close));
     let screen = tokio::spawn(screen);
     let stopping = notify.stopping(fleet.clone());
-    faces.closing();
-    // No motor waits for a reader of the page.
-    let closed = tokio::spawn(doors.close());
     let ended = exit::end(&fleet, shutdown, &mut ending).await;
+    silences.abort();
+    // Nothing waits for a reader of the page.
+    let closed = tokio::spawn(doors.close());
     // What became of the motors is in them; that the lines are closed is not.
     plant.close_alarms();
     let _ = screen.await;

@@ -12,7 +12,7 @@ use drive_bus::{Endpoint, Line};
 use drive_fleet::{DriveHandle, FleetError, Left, LineBudget};
 use drived_words::closing;
 use tokio::{
-    sync::Mutex,
+    sync::{Mutex, MutexGuard},
     time::{Instant, timeout},
 };
 
@@ -33,7 +33,7 @@ use drived_file::{Config, is_one_wire};
 use drived_http::api::Reload;
 use drived_plant::{
     counts::{Id, Samples, Source},
-    plant::{Plant, views::NoticeView, watched::Watch},
+    plant::{Plant, commands::Rejected, views::NoticeView, watched::Watch},
 };
 use drived_words::{failure::Failure, json::unix};
 
@@ -171,8 +171,11 @@ impl Reloader {
         super::tell_names(&self.0.names, &new.lines, &config.groups);
         // Nobody asks for a drive that is not there yet.
         plant.set_options(super::options(&new.lines));
-        let made = add_all(plant, &changes, &new, &lines, &mut leavings, &self.0.kept)
-            .map(|()| settle(plant, config, &mut new, &changes));
+        let made = match self.may_begin() {
+            Ok(()) => add_all(plant, &changes, &new, &lines, &mut leavings, &self.0.kept),
+            Err(_) => Err(FleetError::ShutDown),
+        };
+        let made = made.map(|()| settle(plant, config, &mut new, &changes));
         *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner) = leavings;
         // Also where nothing has changed: what is kept may have been mended.
         super::tell_names(&self.0.names, &config.lines, &config.groups);
@@ -217,7 +220,7 @@ impl Reloader {
 
     /// Reads the file and does what has changed in it, however long that takes.
     pub(super) async fn read_again(&self, dry_run: bool) -> Result<Vec<String>, Failure> {
-        let mut config = self.0.config.lock().await;
+        let mut config = self.changing().await?;
         let file = self.0.file.clone();
         // A name of a server may have to be looked up.
         let read = blocking(move || Config::load_workable(&file)).await;
@@ -233,6 +236,21 @@ impl Reloader {
             return Ok(changes.iter().map(|change| change.would_be(&self.0.plant.fleet())).collect());
         }
         self.take(&mut config, read).await
+    }
+
+    /// What holds now, for whoever changes it: nobody does any more when the program is about to end, for who came then would end by no
+    /// policy.
+    async fn changing(&self) -> Result<MutexGuard<'_, Config>, Failure> {
+        let config = self.0.config.lock().await;
+        self.may_begin().map(|()| config)
+    }
+
+    /// Whether anything new may be begun.
+    pub(super) fn may_begin(&self) -> Result<(), Failure> {
+        match self.0.plant.is_closing() {
+            true => Err(Failure::Input(Rejected::Closing.to_string())),
+            false => Ok(()),
+        }
     }
 
     /// What holds now, as far as the first hour asks.
@@ -261,7 +279,7 @@ impl Reloader {
         ends: Option<String>,
         change: impl FnOnce(Option<&str>) -> Result<String, Failure> + Send + 'static,
     ) -> Result<Vec<String>, Failure> {
-        let mut config = self.0.config.lock().await;
+        let mut config = self.changing().await?;
         let file = self.0.file.clone();
         let read = blocking(move || {
             // As it stands now: a person may have changed it.
@@ -541,6 +559,8 @@ fn taken(leavings: &mut Leavings, kept: &Kept, plant: &Plant, place: &str, name:
         if kept.runs(place) {
             plant.watched().put_kept(place, name);
         }
+        // Whoever comes to a place has what was kept there: it is nobody's no more.
+        kept.runs.call(place, name);
         return kept.of(place);
     };
     if let Some(watch) = watch {

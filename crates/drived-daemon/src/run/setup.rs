@@ -172,6 +172,7 @@ impl Setup for Desk {
         let line: LineSpec = wanted.line.trim().parse().map_err(input)?;
         let endpoint = endpoint(&line)?;
         let addresses: Addresses = wanted.addresses.as_deref().unwrap_or(ALL).parse().map_err(input)?;
+        self.0.reloader.may_begin()?;
         let (tell, given_up) = oneshot::channel();
         let before = {
             let mut scan = self.scan();

@@ -303,6 +303,8 @@ impl Desk {
         action: Action,
         (arrived, deadline): (Instant, Instant),
     ) -> Result<(), Refusal> {
+        // Also whoever is heard for a motor that runs stays who he is.
+        self.may_begin()?;
         let before = self.clients.write(peer, drive.name(), Word::Run);
         let snapshot = drive.snapshot();
         let status = snapshot.fresh_status(Instant::now());
@@ -332,8 +334,17 @@ impl Desk {
         self.order_asked_after(caller, drive, action, (arrived, asked_after), deadline).await
     }
 
+    /// Whether what goes to a drive otherwise than as a command of the plant may begin.
+    fn may_begin(&self) -> Result<(), Refusal> {
+        match self.plant.is_closing() {
+            true => Err(Refusal::rule(Rejected::Closing.to_string())),
+            false => Ok(()),
+        }
+    }
+
     /// A step of the ladder is written as it is, so that the drive shows it. The motor stands, or it would be a stop.
     async fn prepare(&self, drive: &DriveHandle, ask: &Ask, arrived: Instant) -> Result<(), Refusal> {
+        self.may_begin()?;
         let settings = drive.settings();
         if !settings.control || !settings.commanders.allow(&self.config.name) {
             return Err(Refusal::rule(format!("{} may not command this drive", self.config.name)));

@@ -474,3 +474,28 @@ async fn a_write_to_a_drive_that_does_not_answer_is_told_by_0b() {
     }
     assert_eq!(peer.ask(1, &write(LFR, 300)).await, [0x86, 0x0B]);
 }
+
+#[tokio::test(start_paused = true)]
+async fn once_the_daemon_is_about_to_end_a_word_that_stops_is_taken_and_no_other() {
+    let (plant, desk) = operated(2, |config| config.raw_writes = true).await;
+    let mut peer = Peer::of(&desk);
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &write(LFR, 300)).await, write(LFR, 300));
+    assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+    plant.plant.close();
+    let before = plant.machines[1].requests(6) + plant.machines[1].requests(16);
+    for (register, word) in [(CMD, 0x0006), (CMD, 0x000F), (LFR, 200)] {
+        assert_eq!(peer.ask(2, &write(register, word)).await, [0x86, 0x04], "{register} = {word:04X}h");
+    }
+    assert_eq!(
+        plant.machines[1].requests(6) + plant.machines[1].requests(16),
+        before,
+        "it has heard of nothing"
+    );
+    assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, [0x86, 0x04]);
+    assert!(plant.machines[0].observe().running, "and who runs is left as it is");
+    assert_eq!(state(&mut peer, 1).await, 0x0027, "what is there is told");
+    assert_eq!(peer.ask(1, &write(CMD, 0x0007)).await, write(CMD, 0x0007));
+    sleep(Duration::from_secs(10)).await;
+    assert!(!plant.machines[0].observe().running);
+}

@@ -5,7 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::problem::Problem;
-use drived_plant::plant::Plant;
+use drived_plant::plant::{Plant, commands::Rejected};
 
 /// All is well.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
@@ -18,6 +18,9 @@ pub(super) async fn lives() -> Json<Health> {
 }
 
 pub(super) async fn ready(State(plant): State<Plant>) -> Result<Json<Health>, Problem> {
+    if plant.is_closing() {
+        return Err(Problem::new(StatusCode::SERVICE_UNAVAILABLE, Rejected::Closing.to_string()));
+    }
     let standing = plant.standing_lines();
     if standing.is_empty() {
         return Ok(Json(Health { status: "ready" }));

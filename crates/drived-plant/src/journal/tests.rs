@@ -260,3 +260,48 @@ async fn a_drive_that_a_reload_adds_is_told_of_by_its_line_and_name() {
     journal.await.unwrap();
     told.assert_once(Level::INFO, &["north: connected: pump 2 disabled, the shaft may coast"]);
 }
+
+#[tokio::test(start_paused = true)]
+async fn who_is_called_otherwise_or_is_on_a_line_that_is_has_not_been_away() {
+    let settings = SerialSettings::MODBUS_DEFAULT;
+    let simulated = SimLine::new(Wiring::rtu(settings));
+    let machines = [1, 2].map(|address| {
+        simulated.add_boxed(address, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap()
+    });
+    let open = |port: drive_bus::Slave, slave: SlaveAddress| {
+        Family::ATV312.open_with(port, slave, &Options::default())
+    };
+    let line = || Line::over(simulated.in_memory(), LineConfig::stream(settings));
+    let builder = Fleet::builder().line("north", line());
+    let builder = builder.drive("north", 1, DriveSettings::watched("pump 1"), open);
+    let fleet = builder.drive("north", 2, DriveSettings::watched("pump 2"), open).start().unwrap();
+    let (start, told) = (Instant::now(), Told::default());
+    let heard = told.clone();
+    let journal = tokio::spawn(keep(fleet.clone(), fleet.events(), move |entry| {
+        heard.0.lock().unwrap_or_else(PoisonError::into_inner).push((start.elapsed(), entry));
+    }));
+    let at = |seconds: u64| sleep_until(start + Duration::from_secs(seconds));
+    at(10).await;
+    // Lost by one name and heard again by the other: that is a return.
+    machines[1].mute();
+    at(40).await;
+    fleet.rename("pump 2", DriveSettings::watched("fan")).unwrap();
+    at(50).await;
+    machines[1].unmute();
+    at(120).await;
+    // The line is called otherwise: its drives are taken out and come again.
+    let _ = fleet.remove(&["pump 1", "fan"], Duration::from_secs(5)).await;
+    fleet.remove_line("north").unwrap().close().await;
+    let again = |builder: drive_fleet::FleetBuilder| {
+        let builder = builder.line("hall", line());
+        builder.drive("hall", 1, DriveSettings::watched("pump 1"), open)
+    };
+    fleet.extend(again).unwrap();
+    at(140).await;
+    let _ = fleet.shutdown(Duration::from_secs(5)).await;
+    journal.await.unwrap();
+    told.assert_once(Level::INFO, &["connected: pump 1 disabled"]);
+    // By its own watchdog it has tripped meanwhile.
+    told.assert_once(Level::ERROR, &["north: fan back after "]);
+    told.assert_once(Level::ERROR, &[" back after "]);
+}

@@ -22,7 +22,10 @@ mod watching;
 use std::{
     collections::HashMap,
     env,
-    sync::{Arc, OnceLock, PoisonError, RwLock},
+    sync::{
+        Arc, OnceLock, PoisonError, RwLock,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
 
@@ -77,6 +80,8 @@ struct Inner {
     commands: Log,
     /// When a stop was last asked of each drive.
     stopped: Stopped,
+    /// The program is about to end.
+    closing: AtomicBool,
     pulse: Pulse,
     /// Where commands go on, whoever has given them.
     runtime: Handle,
@@ -125,6 +130,7 @@ impl Plant {
             demo,
             commands: Log::default(),
             stopped: Stopped::default(),
+            closing: AtomicBool::new(false),
             pulse: Pulse::new(),
             runtime: Handle::current(),
             group_starts: Mutex::default(),
@@ -150,6 +156,17 @@ impl Plant {
 
     pub fn fleet(&self) -> Fleet {
         self.0.fleet.clone()
+    }
+
+    /// The program is about to end: by whichever face somebody comes, stops are taken from now on, and nothing else that is asked of a
+    /// drive.
+    pub fn close(&self) {
+        self.0.closing.store(true, Ordering::Release);
+    }
+
+    /// Whether the program is about to end.
+    pub fn is_closing(&self) -> bool {
+        self.0.closing.load(Ordering::Acquire)
     }
 
     pub fn groups(&self) -> Vec<Group> {

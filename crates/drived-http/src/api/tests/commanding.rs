@@ -563,3 +563,36 @@ async fn a_stop_over_http_is_on_the_wire_within_its_bound_while_a_hundred_starts
     sleep(Duration::from_secs(10)).await;
     assert!((0..4).all(|number| !is_running(&plant, number)), "no start came after the stop");
 }
+
+#[tokio::test(start_paused = true)]
+async fn once_the_daemon_is_about_to_end_a_stop_is_carried_out_what_was_begun_is_told_and_nothing_is_started()
+{
+    let plant = TestPlant::of(2).await;
+    let body = json!({"id": "once", "setpoint": {"frequency_hz": 30.0}});
+    assert_eq!(command(&plant.plant, RUN, &body).await.0, StatusCode::OK);
+    assert_eq!(get(&plant.plant, "/readyz").await.0, StatusCode::OK);
+    plant.plant.close();
+    let (status, again) = command(&plant.plant, RUN, &body).await;
+    assert_eq!((status, &again["outcome"]), (StatusCode::OK, &"confirmed".into()), "{again}");
+    for (action, body) in [
+        ("start", json!({"setpoint": {"frequency_hz": 30.0}})),
+        ("setpoint", json!({"setpoint": {"frequency_hz": 30.0}})),
+        ("reset", json!({})),
+        ("release", json!({})),
+        ("save", json!({})),
+    ] {
+        let path = format!("/api/v1/drives/pump%202/{action}");
+        let (status, refused) = command(&plant.plant, &path, &body).await;
+        assert_eq!(status, StatusCode::CONFLICT, "{action}: {refused}");
+        assert_eq!(
+            (&refused["outcome"], &refused["reason"]),
+            (&"refused".into(), &"closing".into()),
+            "{action}"
+        );
+    }
+    assert_eq!(get(&plant.plant, "/readyz").await.0, StatusCode::SERVICE_UNAVAILABLE);
+    assert_eq!(get(&plant.plant, "/api/v1/state").await.0, StatusCode::OK, "what is there is told");
+    let (status, stop) = command(&plant.plant, &format!("{STOP}?wait=20s"), &json!({})).await;
+    assert_eq!((status, &stop["outcome"]), (StatusCode::OK, &"confirmed".into()), "{stop}");
+    assert!(!is_running(&plant, 0) && !is_running(&plant, 1));
+}

@@ -222,6 +222,17 @@ impl Teller {
             EventKind::Removed(action) => {
                 let level = if action.is_alarm() { Level::ERROR } else { Level::INFO };
                 self.say(now, drive, level, "removed", event.kind.to_string());
+                // Who comes by this name behind it, such as on a line that is called otherwise, comes for the first time and not back.
+                let state = self.state(drive);
+                *state = DriveState { line: state.line, ..DriveState::default() };
+            }
+            EventKind::Renamed(old) => {
+                // What was known of it is known of it by its new name.
+                if let Some(known) = self.drives.remove(old) {
+                    let state = self.state(drive);
+                    *state = DriveState { line: state.line, ..known };
+                }
+                self.say(now, drive, Level::INFO, event.kind.name(), event.kind.to_string());
             }
             kind => {
                 let level = match kind {

@@ -7,7 +7,10 @@ use std::{
     sync::{Arc, Weak},
 };
 
-use drive_fleet::alarms::{Alarm, Alarms};
+use drive_fleet::{
+    RunRecord,
+    alarms::{Alarm, Alarms},
+};
 use serde::{Deserialize, Serialize};
 use tokio::task::{JoinHandle, spawn_blocking};
 
@@ -15,6 +18,7 @@ use super::super::{Inner, Plant};
 use drived_config::{
     kept::{Kept, Stale, Unwritten},
     places::Places,
+    records::Records,
 };
 
 /// The form in which they are written.
@@ -32,6 +36,8 @@ pub struct KeptAlarms {
     pub(super) alarms: Alarms,
     /// Where the drives of the alarms are.
     places: DrivePlaces,
+    /// What is kept of the drives' runs and stops.
+    pub(super) runs: Option<Records<RunRecord>>,
 }
 
 /// By the names of the drives.
@@ -68,7 +74,13 @@ impl KeptAlarms {
             Some(now) => (now.clone(), place),
             None => (name, place),
         });
-        Self { file: Some(file), alarms, places: places.collect() }
+        Self { file: Some(file), alarms, places: places.collect(), runs: None }
+    }
+
+    /// The same, where a stop that is kept of a drive which is not in the configuration is an alarm.
+    #[must_use]
+    pub fn with_stops_of(self, runs: Records<RunRecord>) -> Self {
+        Self { runs: Some(runs), ..self }
     }
 }
 

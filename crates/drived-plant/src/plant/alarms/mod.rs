@@ -15,7 +15,10 @@ use std::{
     time::Duration,
 };
 
-use drive_fleet::alarms::{AlarmChange, AlarmKind, AlarmRefused, AlarmView, Alarms};
+use drive_fleet::{
+    RunRecord,
+    alarms::{AlarmChange, AlarmKind, AlarmRefused, AlarmView, Alarms},
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::{sync::watch, time::Instant};
@@ -26,7 +29,7 @@ pub use self::{
     together::{OwnAlarms, Owner, SeenAlarm},
 };
 use super::{Inner, Plant, revisions::Subject};
-use drived_config::rights::Caller;
+use drived_config::{records::Records, rights::Caller};
 use drived_words::json::unix;
 
 /// The alarms as the plant has them.
@@ -34,6 +37,8 @@ pub(super) struct Desk {
     alarms: Mutex<Alarms>,
     /// What is wrong with the program itself, in words.
     wrong: Mutex<BTreeMap<AlarmKind, String>>,
+    /// What is kept of the drives' runs and stops.
+    runs: Option<Records<RunRecord>>,
     /// How often what is kept has changed.
     changed: watch::Sender<u64>,
     /// The program ends: what is seen from now on is its own doing.
@@ -99,6 +104,7 @@ impl Desk {
         Self {
             alarms: Mutex::new(kept.alarms.clone()),
             wrong: Mutex::default(),
+            runs: kept.runs.clone(),
             changed: watch::Sender::new(0),
             is_closed: watch::Sender::new(false),
             began: Instant::now(),
@@ -111,6 +117,11 @@ impl Desk {
 
     fn wrong(&self) -> MutexGuard<'_, BTreeMap<AlarmKind, String>> {
         self.wrong.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The stops that are nobody's.
+    fn stops_left(&self) -> BTreeMap<String, String> {
+        self.runs.as_ref().map(Records::stops_left).unwrap_or_default()
     }
 }
 

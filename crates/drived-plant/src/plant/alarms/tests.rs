@@ -171,3 +171,42 @@ async fn what_is_wrong_with_the_program_is_an_alarm_until_it_is_well_again() {
     assert!(matches!(refused, Err(AlarmRejected::OutOfScope { .. })), "it is of no drive: {refused:?}");
     assert!(test.plant.act_on_alarm(&all, alarm.alarm.id, &act).is_ok());
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_is_nobodys_is_an_alarm_through_restarts_until_its_drive_is_there_again() {
+    const PLACE: &str = "/dev/ttyUSB0 atv312@7";
+    let folder = Folder::new("alarms-stop-left");
+    let file = folder.file("runs.json");
+    let lease = drive_core::Lease::new(drive_core::Direction::Forward, 15);
+    let record = serde_json::json!({ "identity": "ATV312HU22N4", "lease": lease, "stop": "ramp" });
+    let written = serde_json::json!({ PLACE: { "drive": "mixer", "record": record } });
+    fs::write(&file, written.to_string()).unwrap();
+    let runs = || Records::<RunRecord>::open(Some(&file), &Places::default());
+    let kept = || KeptAlarms::in_folder(Some(&folder.file("")), &Places::default()).with_stops_of(runs());
+    let test = TestPlant::keeping(1, &kept()).await;
+    let keeping = test.plant.keep_alarms(kept());
+    sleep(Duration::from_secs(3)).await;
+    let before = one(&test.plant);
+    assert_eq!((before.alarm.kind, before.state), (AlarmKind::StopLeft, AlarmState::Unacknowledged));
+    assert_eq!((before.alarm.drive.as_deref(), before.alarm.of()), (None, "the program".to_owned()));
+    assert!(before.text.contains("the motor may turn") && before.text.contains("mixer"), "{before:?}");
+    let shelve = AlarmAct::Shelve { time: Duration::from_secs(600), why: "later".to_owned() };
+    let refused = test.plant.act_on_alarm(&operator(), before.alarm.id, &shelve);
+    assert_eq!(refused, Err(AlarmRejected::Refused(AlarmRefused::OfMotion)));
+    test.plant.close_alarms();
+    keeping.await.unwrap();
+
+    // The program is started anew: it is the same, and waits for somebody until he has taken note of it.
+    let again = kept();
+    let runs = again.runs.clone().unwrap();
+    let plant = Plant::start_with(test.plant.fleet(), Vec::new(), false, &again, Watched::default());
+    sleep(Duration::from_secs(20)).await;
+    let after = one(&plant);
+    assert_eq!((after.alarm.id, after.alarm.count, after.state), (before.alarm.id, 1, before.state));
+    let noted = plant.act_on_alarm(&operator(), after.alarm.id, &acknowledge("it stands, I saw it")).unwrap();
+    assert_eq!(noted.state, AlarmState::Acknowledged);
+    // Its drive is in the configuration again, and is given the stop.
+    assert!(runs.call(PLACE, "mixer"));
+    sleep(Duration::from_secs(3)).await;
+    assert_eq!(plant.alarms().alarms, []);
+}

@@ -105,6 +105,8 @@ pub enum Rejected {
     Stopped(String),
     #[error("it is not as it was shown: {0}")]
     Otherwise(Otherwise),
+    #[error("the daemon is about to end: until it has, only stops are carried out")]
+    Closing,
     #[error("the id {0:?} was used for another command: expected one that is new, or the same command")]
     IdReused(String),
 }
@@ -117,6 +119,7 @@ impl Rejected {
             Self::NoDrive(_) | Self::NoGroup(_) => (OutcomeWord::Refused, "not_found"),
             Self::Stopped(_) => (OutcomeWord::Superseded, "stop"),
             Self::Otherwise(_) => (OutcomeWord::Refused, "not_as_shown"),
+            Self::Closing => (OutcomeWord::Refused, "closing"),
             Self::IdReused(_) => (OutcomeWord::Refused, "id_reused"),
         }
     }
@@ -250,10 +253,14 @@ impl Plant {
         }
         let asked_after = asked_after.min(request.arrived);
         let meant = match self.meant(caller, &mut request) {
-            // What came before is told, also where it has changed what was shown.
-            Err(Rejected::Otherwise(otherwise)) => {
+            _ if self.is_closing() && !is_stop => Err(Rejected::Closing),
+            meant => meant,
+        };
+        let meant = match meant {
+            // What came before is told, also where it has changed what was shown, and where nothing new is begun.
+            Err(rejected @ (Rejected::Otherwise(_) | Rejected::Closing)) => {
                 let again = self.0.commands.again(caller, &request)?;
-                return again.map(|told| told.subscribe()).ok_or(Rejected::Otherwise(otherwise));
+                return again.map(|told| told.subscribe()).ok_or(rejected);
             }
             meant => meant?,
         };
