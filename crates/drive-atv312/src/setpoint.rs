@@ -18,6 +18,10 @@ use crate::{
 impl<P: Port> Atv312<P> {
     pub(crate) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
         self.read_settings(Class::Command).await?;
+        if self.known.settings.refuses_reference().is_some() {
+            // It may have been set right since.
+            self.read_channels(Class::Command).await?;
+        }
         if let Some(reason) = self.known.settings.refuses_reference() {
             return Err(self.refused(Command::Setpoint(setpoint), reason));
         }

@@ -476,6 +476,26 @@ impl<P: Port> Atv312<P> {
         Ok(())
     }
 
+    /// The settings, and anew those that say whose the reference is: whoever stands at the drive may have set them otherwise since they
+    /// were read, and of a motor that stands no word tells it. Below L3 it is the level itself that may have changed.
+    pub(crate) async fn read_channels(&mut self, class: Class) -> Result<()> {
+        if !self.known.settings.is_complete() {
+            return self.read_settings(class).await;
+        }
+        let level = self.known.settings.level();
+        let channels: &[u16] = match level {
+            Some(AccessLevel::L3) => &[address::RFC, address::FR1],
+            _ => &[address::LAC],
+        };
+        for (index, _) in BLOCKS.iter().enumerate().filter(|(_, (first, ..))| channels.contains(first)) {
+            self.read_setting_again(class, index).await?;
+        }
+        if self.known.settings.level() != level {
+            self.known.settings = Known::default().settings;
+        }
+        self.read_settings(class).await
+    }
+
     /// Reads one block of the settings, for whoever has time; the drive is asked no more once it has refused one.
     pub(crate) async fn read_a_setting(&mut self, class: Class) {
         if !self.known.settings.refused

@@ -100,8 +100,39 @@ async fn one(report: &mut Report, time: Duration, lines: u16, before: u64) -> Re
     run_all(&fleet).await?;
     stop_all(report, &name, &plant, &sites).await?;
     drop(plant);
-    fleet.shutdown(Duration::ZERO).await;
-    Ok(())
+    change_all(report, &name, &fleet).await
+}
+
+/// What a reload does to each drive, done to all of them: other settings, another name, and out.
+async fn change_all(report: &mut Report, name: &impl Fn(&str) -> String, fleet: &Fleet) -> Result<(), Error> {
+    let mut note = |what: &str, since: Duration| {
+        let used = millis(processor_time().saturating_sub(since));
+        report.note(SECTION, name(&format!("processor time until all {what}")), Unit::Millis, used);
+    };
+    let all: Vec<_> = fleet.drives().iter().map(|drive| drive.settings()).collect();
+    let used = processor_time();
+    for settings in &all {
+        fleet.reconfigure(DriveSettings::clone(settings))?;
+    }
+    note("have other settings", used);
+    let renamed = |settings: &DriveSettings| format!("another {}", settings.name);
+    let used = processor_time();
+    for settings in &all {
+        let new = DriveSettings { name: renamed(settings), ..DriveSettings::clone(settings) };
+        fleet.rename(&settings.name, new)?;
+    }
+    note("have another name", used);
+    let names: Vec<String> = all.iter().map(|settings| renamed(settings)).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let used = processor_time();
+    let removed = fleet.remove(&names, Duration::ZERO);
+    note("are on their way out", used);
+    let removed = removed.await.len();
+    note("are out", used);
+    match fleet.drives().len() {
+        0 if removed == all.len() => Ok(()),
+        left => Err(format!("{removed} of {} were taken out, and {left} are left", all.len()).into()),
+    }
 }
 
 /// A line full of drives, set up for the bus.

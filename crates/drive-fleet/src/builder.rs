@@ -18,9 +18,11 @@ use tokio::{
 
 use crate::{
     event::Teller,
-    fleet::{Fleet, Members, Roster},
+    fleet::Fleet,
     handle::Entry,
     line_entry::LineEntry,
+    members::Members,
+    place::Place,
     plan::{Demand, Forecast, LineBudget, PlanProblem, forecast},
     runs::{Keeper, RunKept},
     settings::DriveSettings,
@@ -178,7 +180,7 @@ impl Fleet {
 
 impl FleetBuilder {
     /// Begins an addition to a fleet that runs.
-    pub(crate) fn addition(members: &Roster) -> Self {
+    pub(crate) fn addition(members: &Members) -> Self {
         let wire = |entry: &Arc<LineEntry>| Wire {
             name: entry.name.to_string(),
             line: entry.line.clone(),
@@ -187,9 +189,9 @@ impl FleetBuilder {
             added: Vec::new(),
         };
         Self {
-            lines: members.lines.iter().map(wire).collect(),
-            by_name: members.lines.iter().map(|entry| entry.name.to_string()).zip(0..).collect(),
-            names: members.entries.iter().map(|entry| entry.name.to_string()).collect(),
+            lines: members.lines().map(wire).collect(),
+            by_name: members.lines().map(|entry| entry.name.to_string()).zip(0..).collect(),
+            names: members.drives().map(|entry| entry.name.to_string()).collect(),
             ..Fleet::builder()
         }
     }
@@ -321,22 +323,28 @@ impl FleetBuilder {
     pub fn start(mut self) -> Result<Fleet, FleetError> {
         let (events, first) = broadcast::channel(EVENTS);
         let events = Teller::new(events, self.runs.take());
-        let members = self.enlist(&Members::default(), &events)?;
+        let (lines, drives) = self.enlist(&events)?;
+        let mut members = Members::default();
+        lines.into_iter().for_each(|line| members.add_line(line));
+        drives.into_iter().for_each(|drive| members.add_drive(drive));
         Ok(Fleet::new(members, events, first))
     }
 
-    /// Starts the drives that are added to those that are there, if all of it can work.
-    pub(crate) fn enlist(self, standing: &Members, events: &Teller) -> Result<Members, FleetError> {
+    /// Starts the drives that are added, if all of it can work: these, and the lines that there are then.
+    pub(crate) fn enlist(
+        self,
+        events: &Teller,
+    ) -> Result<(Vec<Arc<LineEntry>>, Vec<Arc<Entry>>), FleetError> {
         let (lines, added) = self.check()?;
-        let mut all = Members { lines, entries: standing.entries.clone() };
+        let mut drives = Vec::with_capacity(added.len());
         for member in added {
-            if let Some(line) = all.lines.get(member.line) {
+            if let Some(line) = lines.get(member.line) {
                 // Before its task asks anything.
                 member.keep_pause(&line.line);
-                all.entries.push(spawn(member, events, Arc::clone(line)));
+                drives.push(spawn(member, events, Arc::clone(line)));
             }
         }
-        Ok(all)
+        Ok((lines, drives))
     }
 
     fn check(mut self) -> Result<(Vec<Arc<LineEntry>>, Vec<Member>), FleetError> {
@@ -484,15 +492,15 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
     let (urgent, urgent_box) = mpsc::unbounded_channel();
     let (snapshots, snapshot) = watch::channel(Arc::new(supervisor.snapshot(now)));
     let (exit, exited) = watch::channel(None);
-    let place = settings.place.as_deref().map_or_else(|| Arc::clone(&name), Arc::from);
-    let events = events.at(Arc::clone(&place));
+    let place = Place::of(&line.name, &line.line.config().endpoint, capabilities.key, slave);
     let keeper =
-        Keeper::new(Arc::clone(&name), Arc::clone(&place), events.runs.clone(), settings.run_before.clone());
+        Keeper::new(Arc::clone(&name), place.clone(), events.runs.clone(), settings.run_before.clone());
     let answers = line.line.slave(slave.number());
     let settings = Arc::new(settings);
     let desk = Desk {
         supervisor,
-        events,
+        place: place.clone(),
+        events: events.clone(),
         snapshots,
         exit,
         callers: BTreeMap::new(),

@@ -22,6 +22,7 @@ use crate::{
     eeprom::{EepromLedger, EepromUse},
     exceeded::Limit,
     outcome::{Outcome, Tenths},
+    place::Place,
     runs::RunKept,
     snapshot::Trip,
     watchdog::WatchdogBefore,
@@ -32,8 +33,8 @@ use crate::{
 pub struct Event {
     /// The drive.
     pub drive: Arc<str>,
-    /// Where it is ([`DriveSettings::place`](crate::DriveSettings::place)): the same by whatever name.
-    pub place: Arc<str>,
+    /// Which machine it is, by whatever name.
+    pub place: Place,
     /// Its place among all events of the fleet, from 1: no two have the same, and what was told later has a higher one,
     /// whatever the wall's clock says.
     pub order: u64,
@@ -50,12 +51,12 @@ pub struct Event {
 }
 
 impl Event {
-    /// Something that happens now, outside of every order.
+    /// Something that happens now, outside of every order and every fleet: the name of its drive says where that is.
     #[must_use]
     pub fn now(drive: impl Into<Arc<str>>, kind: EventKind, cause: Cause) -> Self {
         let Moment { at, wall } = Moment::now();
         let drive = drive.into();
-        Self { place: Arc::clone(&drive), drive, order: 0, at, wall, kind, cause, words: Arc::default() }
+        Self { place: Place::from(&*drive), drive, order: 0, at, wall, kind, cause, words: Arc::default() }
     }
 }
 
@@ -85,8 +86,6 @@ pub(crate) struct Happened {
 pub(crate) struct Teller {
     events: broadcast::Sender<Event>,
     last: Arc<Mutex<u64>>,
-    /// Where the drive is that tells.
-    place: Arc<str>,
     /// Where it is told what is to be kept of run commands.
     pub(crate) runs: Option<mpsc::UnboundedSender<RunKept>>,
 }
@@ -96,25 +95,19 @@ impl Teller {
         events: broadcast::Sender<Event>,
         runs: Option<mpsc::UnboundedSender<RunKept>>,
     ) -> Self {
-        Self { events, last: Arc::default(), place: Arc::from(""), runs }
-    }
-
-    /// The same, for a drive at a place.
-    pub(crate) fn at(&self, place: Arc<str>) -> Self {
-        Self { place, ..self.clone() }
+        Self { events, last: Arc::default(), runs }
     }
 
     pub(crate) fn subscribe(&self) -> broadcast::Receiver<Event> {
         self.events.subscribe()
     }
 
-    pub(crate) fn tell(&self, drive: Arc<str>, moment: Moment, happened: Happened) {
+    pub(crate) fn tell(&self, drive: Arc<str>, place: Place, moment: Moment, happened: Happened) {
         let Happened { kind, cause, words } = happened;
         let Moment { at, wall } = moment;
         // Told under the lock, so that every reader gets them in their order.
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         *last += 1;
-        let place = Arc::clone(&self.place);
         let event = Event { drive, place, order: *last, at, wall, kind, cause, words };
         // Without a reader there is nobody to tell.
         let _ = self.events.send(event);

@@ -1,10 +1,8 @@
 //! [`Fleet`]: the handle of it all.
 
 use std::{
-    collections::HashMap,
     fmt,
     future::poll_fn,
-    ops::Deref,
     pin::Pin,
     sync::{
         Arc, Mutex, PoisonError, RwLock,
@@ -26,67 +24,12 @@ use crate::{
     cause::{Cause, Policy},
     event::{Event, EventKind, ExitAction, Happened, Moment, Teller},
     handle::{DriveHandle, Entry},
-    line_entry::LineEntry,
+    members::Members,
     message::Urgent,
+    place::Place,
     plan::LinePlan,
     round::Round,
 };
-
-/// Who belongs to the fleet.
-#[derive(Clone, Default)]
-pub(crate) struct Members {
-    pub(crate) lines: Vec<Arc<LineEntry>>,
-    pub(crate) entries: Vec<Arc<Entry>>,
-}
-
-/// The same, where each is found by his name and by his line without a walk over all: a stop of all asks for every one of them.
-#[derive(Default)]
-pub(crate) struct Roster {
-    members: Members,
-    by_name: HashMap<Arc<str>, usize>,
-    /// By the name of the line, in the order in which they were added.
-    by_line: HashMap<Arc<str>, Vec<usize>>,
-    lines_by_name: HashMap<Arc<str>, usize>,
-}
-
-impl Deref for Roster {
-    type Target = Members;
-
-    fn deref(&self) -> &Members {
-        &self.members
-    }
-}
-
-impl Roster {
-    fn new(members: Members) -> Self {
-        let mut by_line = HashMap::<_, Vec<usize>>::new();
-        for (number, entry) in members.entries.iter().enumerate() {
-            by_line.entry(Arc::clone(&entry.line.name)).or_default().push(number);
-        }
-        let by_name = members.entries.iter().map(|entry| Arc::clone(&entry.name)).zip(0..).collect();
-        let lines_by_name = members.lines.iter().map(|entry| Arc::clone(&entry.name)).zip(0..).collect();
-        Self { members, by_name, by_line, lines_by_name }
-    }
-
-    fn named(&self, name: &str) -> Option<&Arc<Entry>> {
-        self.members.entries.get(*self.by_name.get(name)?)
-    }
-
-    fn line_named(&self, name: &str) -> Option<&Arc<LineEntry>> {
-        self.members.lines.get(*self.lines_by_name.get(name)?)
-    }
-
-    pub(crate) fn on_line(&self, line: &str) -> impl Iterator<Item = &Arc<Entry>> {
-        let numbers = self.by_line.get(line).into_iter().flatten();
-        numbers.filter_map(|number| self.members.entries.get(*number))
-    }
-}
-
-impl Members {
-    pub(crate) fn on<'a>(&'a self, line: &'a Arc<LineEntry>) -> impl Iterator<Item = &'a Arc<Entry>> {
-        self.entries.iter().filter(move |entry| Arc::ptr_eq(&entry.line, line))
-    }
-}
 
 /// Many drives on many lines, each watched by a task of its own. Cheap to clone.
 ///
@@ -133,7 +76,7 @@ pub struct Fleet {
 }
 
 pub(crate) struct Inner {
-    members: RwLock<Arc<Roster>>,
+    members: RwLock<Arc<Members>>,
     /// One change of the members at a time.
     pub(crate) changing: Mutex<()>,
     /// Gone when the fleet has shut down, so that readers see its end.
@@ -149,7 +92,7 @@ pub(crate) struct Inner {
 impl fmt::Debug for Fleet {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let members = self.members();
-        let drives: Vec<_> = members.entries.iter().map(|entry| &entry.name).collect();
+        let drives: Vec<_> = members.drives().map(|entry| &entry.name).collect();
         f.debug_struct("Fleet").field("drives", &drives).finish_non_exhaustive()
     }
 }
@@ -157,7 +100,7 @@ impl fmt::Debug for Fleet {
 impl Fleet {
     pub(crate) fn new(members: Members, events: Teller, first: broadcast::Receiver<Event>) -> Self {
         let inner = Inner {
-            members: RwLock::new(Arc::new(Roster::new(members))),
+            members: RwLock::new(Arc::new(members)),
             changing: Mutex::default(),
             events: Mutex::new(Some(events)),
             acts: AtomicU64::new(0),
@@ -170,20 +113,25 @@ impl Fleet {
     /// The drive with a name.
     #[must_use]
     pub fn drive(&self, name: &str) -> Option<DriveHandle> {
-        let members = self.members();
-        members.named(name).map(|entry| DriveHandle::new(Arc::clone(entry)))
+        self.members().drive(name).map(|entry| DriveHandle::new(Arc::clone(entry)))
+    }
+
+    /// The drive at a place, whatever it is called.
+    #[must_use]
+    pub fn drive_at(&self, place: &Place) -> Option<DriveHandle> {
+        self.members().drive_at(place).map(|entry| DriveHandle::new(Arc::clone(entry)))
     }
 
     /// All drives, in the order in which they were added.
     #[must_use]
     pub fn drives(&self) -> Vec<DriveHandle> {
-        self.members().entries.iter().map(|entry| DriveHandle::new(Arc::clone(entry))).collect()
+        self.members().drives().map(|entry| DriveHandle::new(Arc::clone(entry))).collect()
     }
 
     /// The lines by their names, in the order in which they were added.
     #[must_use]
     pub fn lines(&self) -> Vec<(Arc<str>, Line)> {
-        self.members().lines.iter().map(|entry| (Arc::clone(&entry.name), entry.line.clone())).collect()
+        self.members().lines().map(|entry| (Arc::clone(&entry.name), entry.line.clone())).collect()
     }
 
     /// The drives of a line, in the order in which they were added.
@@ -203,7 +151,7 @@ impl Fleet {
     /// The plan of a line.
     #[must_use]
     pub fn plan(&self, line: &str) -> Option<LinePlan> {
-        self.members().line_named(line).map(|entry| entry.plan())
+        self.members().line(line).map(|entry| entry.plan())
     }
 
     /// Ends the fleet: each drive's policy acts, and what was done is listed. What is not done after `limit` is given up;
@@ -218,8 +166,8 @@ impl Fleet {
         &self,
         limit: Duration,
     ) -> impl Future<Output = Vec<(Arc<str>, ExitAction)>> + Send + use<> {
-        let (ended, inner) =
-            (end(self.members().entries.clone(), Policy::Exit, limit), Arc::clone(&self.inner));
+        let all = self.members().drives().cloned().collect();
+        let (ended, inner) = (end(all, Policy::Exit, limit), Arc::clone(&self.inner));
         async move {
             let actions = ended.await;
             inner.events.lock().unwrap_or_else(PoisonError::into_inner).take();
@@ -232,7 +180,7 @@ impl Fleet {
         format!("group-{}", self.inner.acts.fetch_add(1, Ordering::Relaxed) + 1)
     }
 
-    pub(crate) fn members(&self) -> Arc<Roster> {
+    pub(crate) fn members(&self) -> Arc<Members> {
         Arc::clone(&self.inner.members.read().unwrap_or_else(PoisonError::into_inner))
     }
 
@@ -242,12 +190,21 @@ impl Fleet {
         let Some(teller) = self.sender() else { return };
         let kind = EventKind::LineFinding { finding, present };
         let happened = Happened { kind, cause: Cause::Found, words: Arc::default() };
-        teller.tell(Arc::clone(drive.name()), Moment::now(), happened);
+        teller.tell(Arc::clone(drive.name()), drive.place().clone(), Moment::now(), happened);
     }
 
-    /// Exchanges the members. Who changes them holds [`Inner::changing`].
-    pub(crate) fn set_members(&self, members: Members) {
-        *self.inner.members.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(Roster::new(members));
+    /// Changes the members. Who changes them holds [`Inner::changing`], and no members of his own.
+    pub(crate) fn change<T>(&self, change: impl FnOnce(&mut Members) -> T) -> T {
+        let write = || self.inner.members.write().unwrap_or_else(PoisonError::into_inner);
+        if let Some(members) = Arc::get_mut(&mut write()) {
+            return change(members);
+        }
+        // Somebody reads those of before and keeps them; nobody waits while they are copied, a stop least of all.
+        let mut changed = Members::clone(&self.members());
+        let told = change(&mut changed);
+        let before = std::mem::replace(&mut *write(), Arc::new(changed));
+        drop(before);
+        told
     }
 
     /// Where events are told; `None` after the shut-down.

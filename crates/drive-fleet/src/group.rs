@@ -22,10 +22,11 @@ use tokio_modbus::{Request, client::Client};
 
 use crate::{
     cause::Act,
-    fleet::{Fleet, Roster},
+    fleet::Fleet,
     group_ticket::{GroupStop, GroupTicket, StopReport, Told},
     handle::{DriveHandle, Entry},
     line_entry::LineEntry,
+    members::Members,
     outcome::{Order, Outcome, Refused, Unconfirmed, Unknown, Until},
     round::Round,
     snapshot::{Link, Snapshot, has_reached},
@@ -411,7 +412,7 @@ struct OfLine<'a> {
 
 impl OfLine<'_> {
     /// The write that stops every drive of the line, if it means a stop to all of them and all are meant.
-    fn common_write(&self, standing: &Roster, mode: StopMode) -> Option<BroadcastWrite> {
+    fn common_write(&self, standing: &Members, mode: StopMode) -> Option<BroadcastWrite> {
         let on_line = || standing.on_line(&self.line.name);
         let is_meant =
             |entry: &Arc<Entry>| self.members.iter().any(|(_, member)| Arc::ptr_eq(&member.entry, entry));

@@ -26,6 +26,7 @@ use crate::{
     line_entry::LineEntry,
     message::{Message, Urgent},
     outcome::{Order, Refused, Until},
+    place::Place,
     plan::Demand,
     progress::{Progress, refused},
     round::Round,
@@ -39,7 +40,7 @@ use crate::{
 /// What the handles of a drive share.
 pub(crate) struct Entry {
     pub(crate) name: Arc<str>,
-    pub(crate) place: Arc<str>,
+    pub(crate) place: Place,
     pub(crate) line: Arc<LineEntry>,
     pub(crate) slave: SlaveAddress,
     pub(crate) capabilities: &'static Capabilities,
@@ -164,9 +165,9 @@ impl DriveHandle {
         &self.entry.name
     }
 
-    /// Where it is ([`DriveSettings::place`]): the same by whatever name.
+    /// Which machine it is, by whatever name.
     #[must_use]
-    pub fn place(&self) -> &Arc<str> {
+    pub fn place(&self) -> &Place {
         &self.entry.place
     }
 

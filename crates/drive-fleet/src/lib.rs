@@ -57,9 +57,11 @@ mod group_ticket;
 mod handle;
 mod limits;
 mod line_entry;
+mod members;
 mod membership;
 mod message;
 mod outcome;
+mod place;
 mod plan;
 mod progress;
 mod round;
@@ -96,6 +98,7 @@ pub use limits::{Band, FrequencyLimits, LimitProblem};
 pub use outcome::{
     Became, LastSeen, Order, Outcome, Refused, Started, StopModes, Unconfirmed, Unknown, Until,
 };
+pub use place::Place;
 pub use plan::{Demand, Feed, Forecast, LineBudget, LinePlan, PlanProblem, forecast, plan};
 pub use runs::RunKept;
 pub use settings::{

@@ -1,6 +1,7 @@
 //! Who belongs to a fleet that runs: lines and drives come, change and go, and the others notice nothing.
 
 use std::{
+    collections::BTreeSet,
     sync::{Arc, PoisonError},
     time::Duration,
 };
@@ -12,9 +13,8 @@ use crate::{
     builder::{FleetBuilder, FleetError, SettingProblem, check_settings},
     cause::Policy,
     event::ExitAction,
-    fleet::{Fleet, Members, end},
+    fleet::{Fleet, end},
     handle::Entry,
-    line_entry::LineEntry,
     message::Urgent,
     plan::forecast,
     settings::DriveSettings,
@@ -41,9 +41,11 @@ impl Fleet {
     pub fn extend(&self, add: impl FnOnce(FleetBuilder) -> FleetBuilder) -> Result<(), FleetError> {
         let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
         let events = self.sender().ok_or(FleetError::ShutDown)?;
-        let standing = self.members();
-        let members = add(FleetBuilder::addition(&standing)).enlist(&standing, &events)?;
-        self.set_members(members);
+        let (lines, drives) = add(FleetBuilder::addition(&self.members())).enlist(&events)?;
+        self.change(|members| {
+            lines.into_iter().for_each(|line| members.add_line(line));
+            drives.into_iter().for_each(|drive| members.add_drive(drive));
+        });
         Ok(())
     }
 
@@ -56,15 +58,14 @@ impl Fleet {
     /// added again.
     pub fn reconfigure(&self, settings: DriveSettings) -> Result<(), FleetError> {
         let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
-        let members = self.members();
-        let entry = members.entries.iter().find(|entry| *entry.name == *settings.name);
+        let entry = self.members().drive(&settings.name).cloned();
         let Some(entry) = entry else { return Err(FleetError::NoSuchDrive(settings.name)) };
-        check_exchange(entry, &settings)?;
+        check_exchange(&entry, &settings)?;
         let settings = Arc::new(settings);
         *entry.settings.write().unwrap_or_else(PoisonError::into_inner) = Arc::clone(&settings);
         // A task that is gone has nothing to change.
         let _ = entry.urgent.send(Urgent::Settings(settings));
-        replan(&members, &entry.line);
+        self.replan(&entry.line.name);
         Ok(())
     }
 
@@ -76,21 +77,19 @@ impl Fleet {
     /// [`FleetError::NameTaken`], and as of [`reconfigure`](Self::reconfigure); nothing has changed then.
     pub fn rename(&self, old: &str, settings: DriveSettings) -> Result<(), FleetError> {
         let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut members = Members::clone(&**self.members());
-        if members.entries.iter().any(|entry| *entry.name == *settings.name) {
+        if self.members().drive(&settings.name).is_some() {
             return Err(FleetError::NameTaken(settings.name));
         }
-        let Some(entry) = members.entries.iter_mut().find(|entry| *entry.name == *old) else {
-            return Err(FleetError::NoSuchDrive(old.to_owned()));
-        };
-        check_exchange(entry, &settings)?;
+        let entry = self.members().drive(old).cloned();
+        let Some(entry) = entry else { return Err(FleetError::NoSuchDrive(old.to_owned())) };
+        check_exchange(&entry, &settings)?;
         let settings = Arc::new(settings);
         let name: Arc<str> = Arc::from(settings.name.as_str());
         let now = Snapshot { name: Arc::clone(&name), ..Snapshot::clone(&entry.snapshots.borrow()) };
         let (told, snapshots) = watch::channel(Arc::new(now));
         let renamed = Arc::new(Entry {
             name,
-            place: Arc::clone(&entry.place),
+            place: entry.place.clone(),
             line: Arc::clone(&entry.line),
             slave: entry.slave,
             capabilities: entry.capabilities,
@@ -104,12 +103,10 @@ impl Fleet {
             exit: entry.exit.clone(),
         });
         *entry.settings.write().unwrap_or_else(PoisonError::into_inner) = Arc::clone(&settings);
-        let line = Arc::clone(&renamed.line);
-        *entry = renamed;
+        self.change(|members| members.rename(old, renamed));
         // A task that is gone has nothing to change.
         let _ = entry.urgent.send(Urgent::Renamed(settings, told));
-        replan(&members, &line);
-        self.set_members(members);
+        self.replan(&entry.line.name);
         Ok(())
     }
 
@@ -126,18 +123,15 @@ impl Fleet {
         drives: &[&str],
         limit: Duration,
     ) -> impl Future<Output = Vec<(Arc<str>, ExitAction)>> + Send + use<> {
-        let is_meant = |name: &str| drives.contains(&name);
-        let leaving: Vec<_> =
-            self.members().entries.iter().filter(|entry| is_meant(&entry.name)).cloned().collect();
-        let (ended, fleet) = (end(leaving.clone(), Policy::Removal, limit), self.clone());
+        let leaving = self.members().numbered(drives);
+        let (ended, fleet) = (end(leaving.values().cloned().collect(), Policy::Removal, limit), self.clone());
         async move {
             let actions = ended.await;
             // Not before: nobody waits for a policy with the lock in hand.
             let _changing = fleet.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
-            let mut members = Members::clone(&**fleet.members());
-            members.entries.retain(|entry| !leaving.iter().any(|left| Arc::ptr_eq(left, entry)));
-            leaving.iter().for_each(|left| replan(&members, &left.line));
-            fleet.set_members(members);
+            fleet.change(|members| leaving.keys().for_each(|number| members.remove_drive(*number)));
+            let lines: BTreeSet<&str> = leaving.values().map(|left| &*left.line.name).collect();
+            lines.into_iter().for_each(|line| fleet.replan(line));
             actions
         }
     }
@@ -145,14 +139,15 @@ impl Fleet {
     /// Takes a line without drives out of the fleet, and gives it. `None` where the fleet has no such line, or drives on it.
     pub fn remove_line(&self, line: &str) -> Option<Line> {
         let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut members = Members::clone(&**self.members());
-        let at = members.lines.iter().position(|entry| &*entry.name == line)?;
-        if members.on(members.lines.get(at)?).next().is_some() {
-            return None;
-        }
-        let removed = members.lines.remove(at);
-        self.set_members(members);
-        Some(removed.line.clone())
+        self.change(|members| members.remove_line(line)).map(|removed| removed.line.clone())
+    }
+
+    /// Plans a line anew whose drives have changed.
+    fn replan(&self, line: &str) {
+        let members = self.members();
+        let Some(entry) = members.line(line) else { return };
+        let demands: Vec<_> = members.on_line(line).map(|drive| drive.demand()).collect();
+        entry.set_plan(forecast(entry.budget, &demands, 0).plan);
     }
 }
 
@@ -168,10 +163,4 @@ fn check_exchange(entry: &Entry, settings: &DriveSettings) -> Result<(), FleetEr
         Some(problem) => Err(FleetError::Setting { drive: settings.name.clone(), problem }),
         None => Ok(()),
     }
-}
-
-/// Plans a line anew whose drives have changed.
-fn replan(members: &Members, line: &Arc<LineEntry>) {
-    let demands: Vec<_> = members.on(line).map(|entry| entry.demand()).collect();
-    line.set_plan(forecast(line.budget, &demands, 0).plan);
 }

@@ -8,7 +8,7 @@ use tokio::{
     time::timeout,
 };
 
-use crate::{settings::RunRecord, stop_order::StopOrder};
+use crate::{place::Place, settings::RunRecord, stop_order::StopOrder};
 
 /// How long a start waits at the most until its record is kept: a disk that hangs holds up no pump for ever. Less than half of
 /// the second that a command may wait, and that goes on meanwhile.
@@ -21,8 +21,8 @@ const KEPT_WITHIN: Duration = Duration::from_millis(400);
 pub struct RunKept {
     /// The drive, by the name that it has now.
     pub drive: Arc<str>,
-    /// By what it is kept: where the drive is ([`DriveSettings::place`](crate::DriveSettings::place)), whatever it is called.
-    pub place: Arc<str>,
+    /// By what it is kept: which machine the drive is, whatever it is called.
+    pub place: Place,
     /// The run command that stands, or is about to be given, and the stop that is not confirmed; `None`: none of this side stands any
     /// more, and no stop is under way, as the drive's own words have shown.
     pub run: Option<RunRecord>,
@@ -43,7 +43,7 @@ impl RunKept {
 #[derive(Debug)]
 pub(crate) struct Keeper {
     drive: Arc<str>,
-    place: Arc<str>,
+    place: Place,
     keeps: Option<mpsc::UnboundedSender<RunKept>>,
     told: Option<RunRecord>,
 }
@@ -51,7 +51,7 @@ pub(crate) struct Keeper {
 impl Keeper {
     pub(crate) fn new(
         drive: Arc<str>,
-        place: Arc<str>,
+        place: Place,
         keeps: Option<mpsc::UnboundedSender<RunKept>>,
         kept: Option<RunRecord>,
     ) -> Self {
@@ -117,7 +117,7 @@ impl Keeper {
     fn tell(&mut self, run: Option<RunRecord>, kept: Option<oneshot::Sender<()>>) {
         self.told.clone_from(&run);
         if let Some(keeps) = &self.keeps {
-            let (drive, place) = (Arc::clone(&self.drive), Arc::clone(&self.place));
+            let (drive, place) = (Arc::clone(&self.drive), self.place.clone());
             let _ = keeps.send(RunKept { drive, place, run, kept });
         }
     }
@@ -142,8 +142,7 @@ mod tests {
     #[test]
     fn a_stop_is_kept_with_its_run_and_the_identity_of_the_start_until_it_is_over() {
         let (keeps, kept) = mpsc::unbounded_channel();
-        let mut keeper =
-            Keeper::new(Arc::from("pump"), Arc::from("/dev/ttyUSB0 atv312@1"), Some(keeps), None);
+        let mut keeper = Keeper::new(Arc::from("pump"), "/dev/ttyUSB0 atv312@1".into(), Some(keeps), None);
         keeper.follow(Some(RUN), None, || Some("one".to_owned()));
         // Its line was lost: it has not said anew which it is.
         keeper.follow(Some(RUN), Some(StopMode::Ramp.into()), || None);
@@ -160,8 +159,8 @@ mod tests {
     #[test]
     fn a_run_is_kept_by_the_place_of_its_drive_whatever_that_is_called() {
         let (keeps, mut kept) = mpsc::unbounded_channel();
-        let place: Arc<str> = Arc::from("/dev/ttyUSB0 atv312@1");
-        let mut keeper = Keeper::new(Arc::from("north"), Arc::clone(&place), Some(keeps), None);
+        let place = Place::from("/dev/ttyUSB0 atv312@1");
+        let mut keeper = Keeper::new(Arc::from("north"), place.clone(), Some(keeps), None);
         keeper.follow(Some(RUN), None, || Some("one".to_owned()));
         keeper.follow_name(Arc::from("south"));
         keeper.follow(None, None, || None);
@@ -172,8 +171,8 @@ mod tests {
         assert_eq!(
             told,
             [
-                (north, Arc::clone(&place), run.clone()),
-                (Arc::clone(&south), Arc::clone(&place), run),
+                (north, place.clone(), run.clone()),
+                (Arc::clone(&south), place.clone(), run),
                 (south, place, None)
             ]
         );
@@ -182,8 +181,7 @@ mod tests {
     #[test]
     fn a_stop_is_kept_with_its_seconds_behind_the_run_command_that_it_has_ended() {
         let (keeps, kept) = mpsc::unbounded_channel();
-        let mut keeper =
-            Keeper::new(Arc::from("pump"), Arc::from("/dev/ttyUSB0 atv312@1"), Some(keeps), None);
+        let mut keeper = Keeper::new(Arc::from("pump"), "/dev/ttyUSB0 atv312@1".into(), Some(keeps), None);
         let held = Some(StopOrder::injecting(Duration::from_secs(20)));
         keeper.follow(Some(RUN), None, || Some("one".to_owned()));
         keeper.follow(Some(RUN), held, || None);
@@ -200,8 +198,7 @@ mod tests {
     #[test]
     fn a_stop_of_a_motor_that_somebody_else_runs_is_kept_with_the_drive_that_it_was_asked_of() {
         let (keeps, kept) = mpsc::unbounded_channel();
-        let mut keeper =
-            Keeper::new(Arc::from("pump"), Arc::from("/dev/ttyUSB0 atv312@1"), Some(keeps), None);
+        let mut keeper = Keeper::new(Arc::from("pump"), "/dev/ttyUSB0 atv312@1".into(), Some(keeps), None);
         let fast = Some(StopMode::Fast.into());
         keeper.follow(None, fast, || None);
         keeper.follow(None, fast, || Some("one".to_owned()));

@@ -129,10 +129,6 @@ settings! {
         pub injection: Option<Duration>,
     }
     known besides {
-        /// Where it is, whatever it is called, such as its port, its address and its family: by this whoever keeps something of it
-        /// ([`RunKept::place`](crate::RunKept::place), [`Event::place`](crate::Event::place)) knows it again. `None`: by the name that it
-        /// had first. It holds as long as the drive is in the fleet.
-        pub place: Option<String>,
         /// What it said it was; `None`: what it says first is remembered.
         pub identity: Option<Identity>,
         /// What was found of its communication watchdog before it was armed, where nobody lived to put that back.
@@ -159,12 +155,6 @@ pub struct Left {
 }
 
 impl DriveSettings {
-    /// These settings, for a drive at this [place](Self::place).
-    #[must_use]
-    pub fn at(self, place: impl Into<String>) -> Self {
-        Self { place: Some(place.into()), ..self }
-    }
-
     /// These settings, for a drive of which a run before has left this. What the settings say themselves of its identity counts.
     #[must_use]
     pub fn after(self, left: Left) -> Self {

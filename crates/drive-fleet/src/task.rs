@@ -20,6 +20,7 @@ use crate::{
     event::{ExitAction, Moment, Teller},
     message::{Message, Urgent},
     outcome::Refused,
+    place::Place,
     progress::Report,
     round::Round,
     runs::Keeper,
@@ -247,6 +248,8 @@ where
 /// The supervisor and those who wait for its words.
 pub(crate) struct Desk {
     pub(crate) supervisor: Supervisor,
+    /// Which machine it is.
+    pub(crate) place: Place,
     pub(crate) events: Teller,
     pub(crate) snapshots: watch::Sender<Arc<Snapshot>>,
     pub(crate) exit: watch::Sender<Option<(ExitAction, Left)>>,
@@ -353,7 +356,7 @@ impl Desk {
                 Output::Event(happened) => {
                     let drive = self.supervisor.name();
                     tracing::debug!(%drive, "{}", happened.kind);
-                    self.events.tell(drive, moment, happened);
+                    self.events.tell(drive, self.place.clone(), moment, happened);
                 }
                 Output::Told(id, told) => {
                     if let Some(asker) = self.askers.remove(&id) {

@@ -10,6 +10,7 @@ use std::{
 };
 
 use crc::{CRC_16_MODBUS, Crc};
+use drive_fleet::Place;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +18,6 @@ pub use self::table::{Configured, Kind, Known, Named, Table, Told, topic_id};
 use crate::{
     config::{Group, LinePart},
     kept::{Kept, Stale},
-    places::place,
 };
 
 /// How many drives a virtual unit has places for.
@@ -56,7 +56,7 @@ pub fn configured(lines: &[LinePart], groups: &[Group]) -> Configured {
         let port = line.config.endpoint.to_string();
         there.drives.extend(line.drives.iter().map(|drive| Named {
             name: drive.settings.name.clone(),
-            place: place(&line.config.endpoint, drive.name),
+            place: line.place(drive.name).to_string(),
             slot: drive.slot,
         }));
         there.lines.push(Named { name: line.name.clone(), place: port, slot: None });
@@ -190,9 +190,10 @@ pub fn file_in(folder: &Path) -> PathBuf {
 }
 
 /// Where drives were by the configuration before this one, and those of before that are gone; none where nobody can say.
-pub fn places_before(folder: Option<&Path>) -> Vec<String> {
+pub fn places_before(folder: Option<&Path>) -> Vec<Place> {
     let kept = folder.and_then(|folder| read(&Kept::at(&file_in(folder))).ok());
-    kept.map(|table| table.drives.into_iter().map(|known| known.place).collect()).unwrap_or_default()
+    kept.map(|table| table.drives.into_iter().map(|known| Place::from(&*known.place)).collect())
+        .unwrap_or_default()
 }
 
 /// What is kept in a file; nothing before the first start.

@@ -8,7 +8,7 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
-use drive_fleet::{EepromLedger, Event, EventKind, Events, Received, RunRecord, WatchdogBefore};
+use drive_fleet::{EepromLedger, Event, EventKind, Events, Place, Received, RunRecord, WatchdogBefore};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use tokio::task::{JoinHandle, spawn_blocking};
 
@@ -73,8 +73,8 @@ pub struct Records<T>(Arc<Mutex<Inner<T>>>);
 #[derive(Debug)]
 struct Inner<T> {
     file: Option<Kept>,
-    /// By the places of the drives, or the names where a version before this one has kept no place.
-    drives: BTreeMap<String, Entry<T>>,
+    /// By the places of the drives, or what stands for one: the name, where a version before this one has kept no place.
+    drives: BTreeMap<Place, Entry<T>>,
     /// Writing has failed, which is told once.
     failing: bool,
 }
@@ -112,21 +112,21 @@ impl<T: Record> Records<T> {
         let (mut drives, mut others, mut is_other) = (BTreeMap::new(), Vec::new(), false);
         for (key, written) in read {
             let (name, place, record) = match written {
-                Written::At { drive, record } => (drive, Some(key), record),
+                Written::At { drive, record } => (drive, Some(Place::from(&*key)), record),
                 Written::Of(record) => (key, None, record),
             };
-            match place.as_deref().and_then(|place| Some((place, places.name_at(place)?))) {
+            match place.as_ref().and_then(|place| Some((place, places.name_at(place)?))) {
                 Some((place, now)) => {
                     is_other |= now != name;
-                    drives.insert(place.to_owned(), Entry::of(now, record));
+                    drives.insert(place.clone(), Entry::of(now, record));
                 }
                 None => others.push((name, place, record)),
             }
         }
         // Whoever is at the place of a record comes first.
         for (name, place, record) in others {
-            let at = place.as_deref().unwrap_or("a place that was not kept");
-            let now = places.now(&name, place.as_deref(), record.stops());
+            let at = place.as_ref().map_or("a place that was not kept".to_owned(), Place::to_string);
+            let now = places.now(&name, place.as_ref(), record.stops());
             if let Some(now) = now.filter(|now| !drives.contains_key(*now)) {
                 if place.is_some() {
                     let text = format!(
@@ -137,7 +137,7 @@ impl<T: Record> Records<T> {
                     tell(&record, &text);
                 }
                 is_other = true;
-                drives.insert(now.to_owned(), Entry::of(&name, record));
+                drives.insert(now.clone(), Entry::of(&name, record));
                 continue;
             }
             let text = format!(
@@ -147,7 +147,7 @@ impl<T: Record> Records<T> {
             tell(&record, &text);
             let (key, name) = match place {
                 Some(place) => (place, Some(name)),
-                None => (name, None),
+                None => (Place::from(&*name), None),
             };
             drives.insert(key, Entry { name, record, is_alone: true });
         }
@@ -160,13 +160,13 @@ impl<T: Record> Records<T> {
     }
 
     /// The record of the drive at a place.
-    pub fn of(&self, place: &str) -> Option<T> {
+    pub fn of(&self, place: &Place) -> Option<T> {
         self.lock().drives.get(place).map(|entry| entry.record.clone())
     }
 
     /// The records of those who are there: by their places, with their names.
-    pub fn all(&self) -> Vec<(String, String, T)> {
-        let there = |(place, entry): (&String, &Entry<T>)| {
+    pub fn all(&self) -> Vec<(Place, String, T)> {
+        let there = |(place, entry): (&Place, &Entry<T>)| {
             let name = entry.name.clone().filter(|_| !entry.is_alone)?;
             Some((place.clone(), name, entry.record.clone()))
         };
@@ -183,7 +183,7 @@ impl<T: Record> Records<T> {
     }
 
     /// Has this be the record of the drive at a place, which is called so now. Gives whether the file is to be written for it.
-    pub fn set(&self, place: &str, drive: &str, record: Option<T>) -> bool {
+    pub fn set(&self, place: &Place, drive: &str, record: Option<T>) -> bool {
         let mut inner = self.lock();
         let Some(record) = record else { return inner.drives.remove(place).is_some() };
         let new = Entry::of(drive, record);
@@ -193,12 +193,12 @@ impl<T: Record> Records<T> {
         if before.is_some_and(is_same) {
             return false;
         }
-        inner.drives.insert(place.to_owned(), new);
+        inner.drives.insert(place.clone(), new);
         true
     }
 
     /// The same for all that are there: who is not among these has none.
-    pub fn set_all(&self, all: impl IntoIterator<Item = (String, String, T)>) {
+    pub fn set_all(&self, all: impl IntoIterator<Item = (Place, String, T)>) {
         let mut inner = self.lock();
         inner.drives.retain(|_, entry| entry.is_alone);
         let all = all.into_iter().map(|(place, drive, record)| (place, Entry::of(&drive, record)));
@@ -206,7 +206,7 @@ impl<T: Record> Records<T> {
     }
 
     /// The drive at a place is called so now. Gives whether the file is to be written for it.
-    pub fn call(&self, place: &str, drive: &str) -> bool {
+    pub fn call(&self, place: &Place, drive: &str) -> bool {
         let record = self.of(place);
         record.is_some() && self.set(place, drive, record)
     }
@@ -220,7 +220,7 @@ impl<T: Record> Records<T> {
         let (file, text) = {
             let inner = self.lock();
             let Some(file) = inner.file.clone() else { return true };
-            let written = |(key, entry): (&String, &Entry<T>)| {
+            let written = |(key, entry): (&Place, &Entry<T>)| {
                 let record = entry.record.clone();
                 let written = match entry.name.clone() {
                     Some(drive) => Written::At { drive, record },

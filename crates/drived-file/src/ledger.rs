@@ -4,16 +4,10 @@
 use std::path::PathBuf;
 
 use drive_bus::LineConfig;
-use drive_fleet::{EEPROM_WRITES_A_DAY, EepromLedger};
+use drive_fleet::{EEPROM_WRITES_A_DAY, EepromLedger, Place};
 
 use crate::Config;
-use drived_config::{
-    config::places,
-    kept::Kept,
-    names::places_before,
-    places::{Places, place},
-    records::Records,
-};
+use drived_config::{config::places, kept::Kept, names::places_before, places::Places, records::Records};
 use drived_words::{drive_spec::DriveName, output};
 
 /// The file of the state folder.
@@ -44,7 +38,7 @@ struct Found {
     file: PathBuf,
     places: Places,
     name: String,
-    place: String,
+    place: Place,
 }
 
 impl LedgerArgs {
@@ -57,14 +51,14 @@ impl LedgerArgs {
         let config = Config::load(&self.config).map_err(|error| error.to_string())?;
         let file = self.config.display();
         let lines = config.lines.iter().filter(|part| part.config.endpoint == line.endpoint);
-        let mut drives = lines.flat_map(|line| &line.drives);
-        let drive = drives.find(|drive| drive.name == name);
-        let drive = drive.ok_or_else(|| format!("{file} has no {name} on this line"))?;
-        let name = drive.settings.name.clone();
+        let mut drives = lines.flat_map(|part| part.drives.iter().map(move |drive| (part, drive)));
+        let drive = drives.find(|(_, drive)| drive.name == name);
+        let (part, drive) = drive.ok_or_else(|| format!("{file} has no {name} on this line"))?;
+        let (place, name) = (part.place(drive.name), drive.settings.name.clone());
         let folder = config.doors.state.folder.as_deref();
         let folder = folder.ok_or_else(|| format!("{file} has no state folder"))?;
         let places = places(&config.lines).collect::<Places>().after(places_before(Some(folder)));
-        Ok(Found { file: folder.join(FILE), places, name, place: place(&line.endpoint, drive.name) })
+        Ok(Found { file: folder.join(FILE), places, name, place })
     }
 }
 
@@ -135,23 +129,23 @@ mod tests {
             reaction: drive_core::Reaction::Ramp,
         };
         let in_vain = Some(drive_fleet::InVain { identity: None, contract });
-        let places: Places = [("pump".to_owned(), PLACE.to_owned())].into_iter().collect();
+        let places: Places = [("pump".to_owned(), PLACE.into())].into_iter().collect();
         let kept = || Records::<EepromLedger>::open(Some(&file), &places);
         let records = kept();
         let mut of_daemon = EepromLedger { in_vain: in_vain.clone(), ..EepromLedger::default() };
         of_daemon.count();
-        records.set(PLACE, "pump", Some(of_daemon));
+        records.set(&PLACE.into(), "pump", Some(of_daemon));
         records.write();
-        let (name, place) = ("pump".to_owned(), PLACE.to_owned());
+        let (name, place) = ("pump".to_owned(), PLACE.into());
         let found = Found { file: file.clone(), places: places.clone(), name, place };
         let mut ledger = Ledger { found: Ok(found), is_told: false };
         ledger.count(0);
         ledger.count(2);
-        let now = kept().of(PLACE).unwrap();
+        let now = kept().of(&PLACE.into()).unwrap();
         assert_eq!((now.writes, now.today, now.is_worn()), (3, 3, false));
         assert_eq!(now.in_vain, in_vain);
         ledger.count(usize::try_from(EEPROM_WRITES_A_DAY).unwrap());
-        assert!(kept().of(PLACE).unwrap().is_worn());
+        assert!(kept().of(&PLACE.into()).unwrap().is_worn());
     }
 
     #[test]

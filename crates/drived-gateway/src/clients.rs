@@ -4,9 +4,10 @@
 use std::{
     collections::HashMap,
     net::IpAddr,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Mutex, PoisonError},
 };
 
+use drive_fleet::Place;
 use tokio::time::Instant;
 
 /// How many addresses are remembered. Who comes back after having been forgotten has to write a word without run again.
@@ -26,7 +27,7 @@ pub(super) struct Clients(Mutex<HashMap<IpAddr, Client>>);
 #[derive(Debug)]
 struct Client {
     heard: Instant,
-    words: HashMap<Arc<str>, (Word, Instant)>,
+    words: HashMap<Place, (Word, Instant)>,
 }
 
 impl Clients {
@@ -36,9 +37,9 @@ impl Clients {
     }
 
     /// A client has written a command word to a drive; gives the one before it, and when that was.
-    pub(super) fn write(&self, peer: IpAddr, drive: &Arc<str>, word: Word) -> Option<(Word, Instant)> {
+    pub(super) fn write(&self, peer: IpAddr, drive: &Place, word: Word) -> Option<(Word, Instant)> {
         let now = Instant::now();
-        self.with(peer, now, |client| client.words.insert(Arc::clone(drive), (word, now)))
+        self.with(peer, now, |client| client.words.insert(drive.clone(), (word, now)))
     }
 
     fn with<T>(&self, peer: IpAddr, now: Instant, act: impl FnOnce(&mut Client) -> T) -> T {

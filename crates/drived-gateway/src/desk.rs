@@ -13,7 +13,7 @@ use drive_core::{
     Class, Port as _, PortError, Terms,
     tokio_modbus::{ExceptionCode, Response, client::Client as _},
 };
-use drive_fleet::{DriveHandle, LineBudget};
+use drive_fleet::{DriveHandle, LineBudget, Place};
 use futures_util::{
     FutureExt as _,
     future::{BoxFuture, Shared, WeakShared},
@@ -53,6 +53,8 @@ pub(super) struct Asked {
     ask: Result<Ask, ExceptionCode>,
     /// It goes ahead of everything.
     pub(super) stop: Option<Stop>,
+    /// To whom a write goes, as it came: its unit may mean others by the time of its turn.
+    written: Vec<DriveHandle>,
 }
 
 /// The PDU of an answer, or the exception instead.
@@ -61,8 +63,8 @@ pub(super) type Answer = Result<Vec<u8>, ExceptionCode>;
 /// An exchange that several clients wait for.
 type Exchange = BoxFuture<'static, Answer>;
 
-/// Reads by the name of their drive.
-type UnderWay = HashMap<(Arc<str>, Ask), WeakShared<Exchange>>;
+/// Reads by the place of their drive.
+type UnderWay = HashMap<(Place, Ask), WeakShared<Exchange>>;
 
 /// The turns of the clients on one line.
 struct Turns {
@@ -144,11 +146,11 @@ impl Desk {
 
     /// The PDU that answers a request; `None`: silence.
     pub(super) async fn answer(self: &Arc<Self>, peer: IpAddr, asked: Asked) -> Option<Vec<u8>> {
-        let Asked { arrived, unit, function, ask, stop } = asked;
+        let Asked { arrived, unit, function, ask, stop, written } = asked;
         let answer = match ask {
             Err(code) if self.config.virtual_unit == Some(unit) => Err(code),
             Err(code) => self.drive(unit).ok_or(ExceptionCode::GatewayPathUnavailable).and(Err(code)),
-            Ok(ask @ Ask::Write { .. }) => self.write(peer, arrived, unit, &ask, stop).await,
+            Ok(ask @ Ask::Write { .. }) => self.write(peer, arrived, unit, &ask, stop, written).await,
             Ok(ask) => self.look_up(arrived, unit, ask).await,
         };
         let (counted, pdu) = match answer {
@@ -165,7 +167,11 @@ impl Desk {
         let Frame { unit, ref pdu, .. } = *frame;
         let ask = Ask::of(pdu);
         let stop = ask.as_ref().ok().and_then(|ask| self.stop_in(unit, ask));
-        Asked { arrived, unit, function: pdu.first().copied().unwrap_or_default(), ask, stop }
+        let written = match &ask {
+            Ok(Ask::Write { .. }) => self.written(unit),
+            _ => Vec::new(),
+        };
+        Asked { arrived, unit, function: pdu.first().copied().unwrap_or_default(), ask, stop, written }
     }
 
     /// The PDU of a refusal that needs no look at the plant.
@@ -201,7 +207,7 @@ impl Desk {
         if self.config.mapped_only && unmapped.next().is_some() {
             return Err(ExceptionCode::IllegalDataAddress);
         }
-        if let Some(words) = self.kept.of(drive.name(), &ask, Instant::now(), self.config.max_age) {
+        if let Some(words) = self.kept.of(drive.place(), &ask, Instant::now(), self.config.max_age) {
             self.counters.keep();
             return Ok(pdu::words(ask.function(), &words));
         }
@@ -254,7 +260,7 @@ impl Desk {
     ) -> (Shared<Exchange>, bool) {
         let mut under_way = lock(&self.under_way);
         under_way.retain(|_, exchange| exchange.upgrade().is_some_and(|exchange| exchange.peek().is_none()));
-        let key = (Arc::clone(drive.name()), ask.clone());
+        let key = (drive.place().clone(), ask.clone());
         if let Some(exchange) = under_way.get(&key).and_then(WeakShared::upgrade) {
             self.counters.join();
             return (exchange, false);
@@ -304,7 +310,7 @@ impl Desk {
                 if let Response::ReadHoldingRegisters(words) | Response::ReadInputRegisters(words) = &response
                 {
                     let at = slave.asked_at().unwrap_or_else(Instant::now);
-                    self.kept.keep(drive.name(), ask, words, at, self.config.max_age);
+                    self.kept.keep(drive.place(), ask, words, at, self.config.max_age);
                 }
                 return Ok(pdu::answer(ask, response));
             }

@@ -8,7 +8,7 @@ use std::{
 
 use drive_core::{Control, Direction, Setpoint, State, Status};
 use drive_fleet::{
-    Became, DriveHandle, Event, EventKind, Events, Freshness, Link, Outcome, Received, Snapshot,
+    Became, DriveHandle, Event, EventKind, Events, Freshness, Link, Outcome, Place, Received, Snapshot,
 };
 use drived_config::names::{PLACES, revision};
 use tokio::time::Instant;
@@ -95,7 +95,7 @@ const DETAILS: [Column; 16] = [
 
 /// What became of the last command to each drive.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Outcomes(Arc<Mutex<HashMap<Arc<str>, Last>>>);
+pub(super) struct Outcomes(Arc<Mutex<HashMap<Place, Last>>>);
 
 #[derive(Debug, Clone, Copy)]
 struct Last {
@@ -110,7 +110,7 @@ impl Outcomes {
         loop {
             match events.recv().await {
                 Received::Event(Event {
-                    drive,
+                    place,
                     at,
                     kind: EventKind::Command { command, outcome, .. },
                     ..
@@ -123,7 +123,7 @@ impl Outcomes {
                         _ => 5,
                     };
                     let last = Last { command, outcome: number_of(&outcome), at };
-                    self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(drive, last);
+                    self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(place, last);
                 }
                 Received::Event(_) | Received::Missed(_) => {}
                 Received::End => return,
@@ -131,7 +131,7 @@ impl Outcomes {
         }
     }
 
-    fn of(&self, drive: &str) -> Option<Last> {
+    fn of(&self, drive: &Place) -> Option<Last> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).get(drive).copied()
     }
 }
@@ -294,7 +294,7 @@ pub(super) fn read(
         Some(Shown {
             snapshot: handle.as_ref().map(DriveHandle::snapshot),
             slave: handle.as_ref().map_or(0, |handle| handle.slave().number()),
-            last: name.as_deref().and_then(|name| outcomes.of(name)),
+            last: handle.as_ref().and_then(|handle| outcomes.of(handle.place())),
             now,
         })
     };

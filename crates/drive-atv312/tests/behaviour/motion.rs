@@ -269,6 +269,46 @@ async fn a_setpoint_is_refused_where_the_reference_comes_from_elsewhere() {
     assert_eq!(writes(&machine), before);
 }
 
+/// Somebody at the keypad of a motor that stands sets Fr1 to AI1 (1), which was Mdb (164), and back (BBV51701 p. 35).
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_is_not_confirmed_where_the_reference_was_set_elsewhere_since_the_drive_was_asked() {
+    let channel = |because: Option<Refusal>| match because {
+        Some(Refusal::Overridden { by, .. }) => by,
+        other => panic!("{other:?}"),
+    };
+    let (mut drive, machine, _line) = rig();
+    drive.set_setpoint(FIFTY).await.unwrap();
+    assert!(machine.poke(row("Fr1").address, 1));
+    let error = drive.set_setpoint(FIFTY).await.unwrap_err();
+    let Error::NotConfirmed { because, .. } = error else { panic!("{error}") };
+    assert_eq!(
+        channel(because),
+        "the reference channel Fr1, which is not Mdb,",
+        "it is in the drive, and not in force"
+    );
+    // The motor would run at what AI1 says.
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Refused, "{error}");
+    let before = writes(&machine);
+    let error = drive.set_setpoint(FIFTY).await.unwrap_err();
+    assert_eq!(channel(refusal(&error)), "the reference channel Fr1, which is not Mdb,");
+    assert_eq!(writes(&machine), before, "what is known now is not tried");
+    assert!(machine.poke(row("Fr1").address, 164));
+    drive.set_setpoint(FIFTY).await.unwrap();
+}
+
+/// Forced local (ETA bit 9 at 0, p. 21): the reference is that of FLOC (p. 55), AI1 as the drive leaves the factory.
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_to_a_motor_that_stands_is_not_confirmed_while_its_panel_has_it() {
+    let (mut drive, machine, _line) = rig();
+    machine.panel(Panel::TakeControl);
+    let error = drive.set_setpoint(FIFTY).await.unwrap_err();
+    let Error::NotConfirmed { because, .. } = error else { panic!("{error}") };
+    assert_eq!(because, Some(Refusal::NotInControl(Control::Local)));
+    machine.panel(Panel::ReleaseControl);
+    drive.set_setpoint(FIFTY).await.unwrap();
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_run_command_that_still_stands_shows_when_somebody_else_gives_control_back() {
     let (mut drive, machine, _line) = running().await;

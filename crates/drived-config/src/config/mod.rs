@@ -13,7 +13,7 @@ pub mod values;
 
 use drive_bus::LineConfig;
 use drive_families::Options;
-use drive_fleet::{Demand, DriveSettings, FleetBuilder, Left, LineBudget};
+use drive_fleet::{Demand, DriveSettings, FleetBuilder, Left, LineBudget, Place};
 use toml::Spanned;
 
 pub use self::line::ROOM_PPM;
@@ -27,7 +27,6 @@ pub use self::{
     table::{Entry, Key, Said, Tells, settings, shown, within},
     values::{NotAmong, Parsed, words},
 };
-use crate::places::place;
 use drived_words::drive_spec::DriveName;
 
 /// The keys of a drive.
@@ -36,10 +35,9 @@ pub fn drive_keys() -> &'static [Key] {
 }
 
 /// The places of the drives of these lines, by their names.
-pub fn places(lines: &[LinePart]) -> impl Iterator<Item = (&str, String)> {
+pub fn places(lines: &[LinePart]) -> impl Iterator<Item = (&str, Place)> {
     lines.iter().flat_map(|line| {
-        let at = |name| place(&line.config.endpoint, name);
-        line.drives.iter().map(move |drive| (drive.settings.name.as_str(), at(drive.name)))
+        line.drives.iter().map(move |drive| (drive.settings.name.as_str(), line.place(drive.name)))
     })
 }
 
@@ -67,6 +65,11 @@ pub struct DrivePart {
 }
 
 impl LinePart {
+    /// Which machine a drive of it is, as the fleet knows it.
+    pub fn place(&self, drive: DriveName) -> Place {
+        Place::of(&self.name, &self.config.endpoint, drive.family.capabilities().key, drive.slave)
+    }
+
     /// What its drives want of it.
     pub fn demands(&self) -> Vec<Demand> {
         let protocol = self.config.protocol;
@@ -85,7 +88,7 @@ pub fn of<T>(said: &Option<Spanned<T>>) -> Option<&T> {
 /// Adds a drive of a line, of which a run before has left this.
 pub fn add(builder: FleetBuilder, line: &LinePart, drive: &DrivePart, left: Left) -> FleetBuilder {
     let DrivePart { name, settings, options, .. } = drive;
-    let settings = settings.clone().at(place(&line.config.endpoint, *name)).after(left);
+    let settings = settings.clone().after(left);
     builder.drive(&line.name, name.slave.number(), settings, |port, slave| {
         name.family.open_with(port, slave, options)
     })

@@ -10,8 +10,8 @@ const TWO: &str = "/dev/ttyUSB0 atv312@2";
 const THREE: &str = "/dev/ttyUSB0 atv312@3";
 
 fn places(drives: &[(&str, &str)]) -> Places {
-    let drives = drives.iter().map(|(name, place)| ((*name).to_owned(), (*place).to_owned()));
-    drives.collect::<Places>().after([ONE, TWO].map(str::to_owned))
+    let drives = drives.iter().map(|(name, place)| ((*name).to_owned(), Place::from(*place)));
+    drives.collect::<Places>().after([ONE, TWO].map(Place::from))
 }
 
 fn record(stop: Option<StopMode>) -> RunRecord {
@@ -30,18 +30,22 @@ fn what_was_kept_is_known_after_a_kill_and_half_a_file_says_nothing() {
     let open = || Records::<RunRecord>::open(Some(&file), &places(&[("pump 1", ONE)]));
     let records = open();
     let run = record(None);
-    assert!(records.set(ONE, "pump 1", Some(run.clone())));
-    assert!(!records.set(ONE, "pump 1", Some(run.clone())), "nothing is written twice");
+    assert!(records.set(&ONE.into(), "pump 1", Some(run.clone())));
+    assert!(!records.set(&ONE.into(), "pump 1", Some(run.clone())), "nothing is written twice");
     records.write();
     // The program was killed.
     let records = open();
-    assert_eq!((records.of(ONE), records.of(TWO)), (Some(run), None));
-    assert!(records.call(ONE, "mixer") && !records.call(ONE, "mixer") && !records.call(TWO, "mixer"));
-    assert!(records.set(ONE, "mixer", None) && !records.set(ONE, "mixer", None));
+    assert_eq!((records.of(&ONE.into()), records.of(&TWO.into())), (Some(run), None));
+    assert!(
+        records.call(&ONE.into(), "mixer")
+            && !records.call(&ONE.into(), "mixer")
+            && !records.call(&TWO.into(), "mixer")
+    );
+    assert!(records.set(&ONE.into(), "mixer", None) && !records.set(&ONE.into(), "mixer", None));
     records.write();
-    assert_eq!(open().of(ONE), None);
+    assert_eq!(open().of(&ONE.into()), None);
     fs::write(&file, "{\"pump 1\":").unwrap();
-    assert_eq!(open().of(ONE), None);
+    assert_eq!(open().of(&ONE.into()), None);
 }
 
 #[test]
@@ -50,12 +54,15 @@ fn a_record_goes_with_the_machine_when_two_names_are_exchanged_in_the_file_behin
     let file = folder.file("runs.json");
     let open = |drives: &[(&str, &str)]| Records::<RunRecord>::open(Some(&file), &places(drives));
     let before = open(&[("north", ONE), ("south", TWO)]);
-    before.set(ONE, "north", Some(record(Some(StopMode::Ramp))));
+    before.set(&ONE.into(), "north", Some(record(Some(StopMode::Ramp))));
     before.write();
     let exchanged = [("south", ONE), ("north", TWO)];
     for _ in 0..2 {
         let after = open(&exchanged);
-        assert_eq!((after.of(ONE), after.of(TWO)), (Some(record(Some(StopMode::Ramp))), None));
+        assert_eq!(
+            (after.of(&ONE.into()), after.of(&TWO.into())),
+            (Some(record(Some(StopMode::Ramp))), None)
+        );
         let [(_, name, _)] = &after.all()[..] else { panic!("{after:?}") };
         assert_eq!(name, "south");
     }
@@ -68,10 +75,10 @@ fn a_file_of_a_version_that_kept_names_alone_is_read_by_the_names_once_and_has_p
     let stop = record(Some(StopMode::Fast));
     fs::write(&file, serde_json::to_vec(&BTreeMap::from([("north", &stop)])).unwrap()).unwrap();
     let open = |drives: &[(&str, &str)]| Records::<RunRecord>::open(Some(&file), &places(drives));
-    assert_eq!(open(&[("north", ONE), ("south", TWO)]).of(ONE), Some(stop.clone()));
+    assert_eq!(open(&[("north", ONE), ("south", TWO)]).of(&ONE.into()), Some(stop.clone()));
     // Killed at once, and the names are exchanged.
     let after = open(&[("south", ONE), ("north", TWO)]);
-    assert_eq!((after.of(ONE), after.of(TWO)), (Some(stop), None));
+    assert_eq!((after.of(&ONE.into()), after.of(&TWO.into())), (Some(stop), None));
 }
 
 #[test]
@@ -81,12 +88,12 @@ fn what_belongs_to_nobody_is_kept_until_the_place_is_there_again() {
     let open = |drives: &[(&str, &str)]| Records::<RunRecord>::open(Some(&file), &places(drives));
     let (run, stop) = (record(None), record(Some(StopMode::Ramp)));
     let before = open(&[("north", ONE), ("south", TWO)]);
-    before.set(ONE, "north", Some(stop.clone()));
-    before.set(TWO, "south", Some(run.clone()));
+    before.set(&ONE.into(), "north", Some(stop.clone()));
+    before.set(&TWO.into(), "south", Some(run.clone()));
     before.write();
     // One of them is at another's place, and one is gone.
     let after = open(&[("north", TWO)]);
-    assert_eq!(after.of(TWO), Some(run.clone()));
+    assert_eq!(after.of(&TWO.into()), Some(run.clone()));
     assert_eq!(after.all().len(), 1);
     after.set_all([]);
     assert!(after.write());
@@ -96,12 +103,12 @@ fn what_belongs_to_nobody_is_kept_until_the_place_is_there_again() {
     after.call(ONE, "east");
     assert_eq!(after.stops_left(), BTreeMap::new());
     // Whoever comes to its place has it.
-    assert_eq!(open(&[("east", ONE)]).of(ONE), Some(stop.clone()));
+    assert_eq!(open(&[("east", ONE)]).of(&ONE.into()), Some(stop.clone()));
     // Its name is at a place that is new: a stop goes with it, and a run does not.
     let after = open(&[("east", THREE)]);
-    assert_eq!(after.of(THREE), Some(stop));
-    after.set(THREE, "east", Some(run.clone()));
+    assert_eq!(after.of(&THREE.into()), Some(stop));
+    after.set(&THREE.into(), "east", Some(run.clone()));
     after.write();
     let after = open(&[("east", "/dev/ttyUSB0 atv312@4")]);
-    assert_eq!((after.of("/dev/ttyUSB0 atv312@4"), after.of(THREE)), (None, Some(run)));
+    assert_eq!((after.of(&"/dev/ttyUSB0 atv312@4".into()), after.of(&THREE.into())), (None, Some(run)));
 }

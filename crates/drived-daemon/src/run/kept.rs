@@ -1,6 +1,6 @@
 //! What earlier runs have left of the drives, by their places.
 
-use drive_fleet::{EepromLedger, Left, RunRecord, WatchdogBefore};
+use drive_fleet::{EepromLedger, Left, Place, RunRecord, WatchdogBefore};
 
 use super::runs;
 use drived_config::{
@@ -29,7 +29,7 @@ impl Kept {
     }
 
     /// What is left of the drive at a place.
-    pub(super) fn of(&self, place: &str) -> Left {
+    pub(super) fn of(&self, place: &Place) -> Left {
         Left {
             identity: None,
             watchdog: self.watchdogs.of(place),
@@ -39,7 +39,7 @@ impl Kept {
     }
 
     /// Whether a run command of this program may stand in the drive at a place.
-    pub(super) fn runs(&self, place: &str) -> bool {
+    pub(super) fn runs(&self, place: &Place) -> bool {
         self.runs.of(place).is_some_and(|run| run.lease.is_some())
     }
 }

@@ -21,7 +21,7 @@ use std::{collections::HashMap, io::IsTerminal as _, path::PathBuf, pin::pin, sy
 
 use drive_bus::Line;
 use drive_families::Options;
-use drive_fleet::{Fleet, FleetBuilder, Left};
+use drive_fleet::{Fleet, FleetBuilder, Left, Place};
 use drived_words::closing;
 use futures_util::future::OptionFuture;
 use tokio::{sync::mpsc, time::timeout};
@@ -38,7 +38,7 @@ use drived_config::{
     config::{Group, LinePart, add, places},
     kept::{BALLAST, lay_ballast},
     names::{self, Names, PLACES, Told},
-    places::{Places, place},
+    places::Places,
     records,
     rights::Caller,
 };
@@ -341,13 +341,14 @@ fn start_lines(config: &Config) -> Result<Vec<Line>, Failure> {
 }
 
 /// By what a run before has left of the drive at each place.
-fn build(config: &Config, lines: &[Line], left: impl Fn(&str) -> Left) -> FleetBuilder {
+fn build(config: &Config, lines: &[Line], left: impl Fn(&Place) -> Left) -> FleetBuilder {
     let mut builder = Fleet::builder();
     for (part, line) in config.lines.iter().zip(lines) {
         builder = builder.line_with(&*part.name, line.clone(), |_| part.budget);
-        builder = part.drives.iter().fold(builder, |builder, drive| {
-            add(builder, part, drive, left(&place(&part.config.endpoint, drive.name)))
-        });
+        builder = part
+            .drives
+            .iter()
+            .fold(builder, |builder, drive| add(builder, part, drive, left(&part.place(drive.name))));
     }
     builder
 }

@@ -9,7 +9,7 @@ use std::{
 };
 
 use drive_bus::{Endpoint, Line};
-use drive_fleet::{DriveHandle, FleetError, Left, LineBudget};
+use drive_fleet::{DriveHandle, FleetError, Left, LineBudget, Place};
 use drived_words::closing;
 use tokio::{
     sync::{Mutex, MutexGuard},
@@ -25,9 +25,8 @@ use super::{
     profiles::Opened,
 };
 use drived_config::{
-    config::{DrivePart, add, places},
+    config::{DrivePart, add},
     names::Names,
-    places::place,
 };
 use drived_file::{Config, is_one_wire};
 use drived_http::api::Reload;
@@ -139,15 +138,12 @@ impl Reloader {
         let openings =
             faces::prepare(&new, |table| changes.iter().any(|change| change.opened_face() == Some(table)))?;
         let leaving: Vec<&str> = changes.iter().filter_map(Change::removed_drive).collect();
-        let handle = |(name, place)| fleet.drive(name).map(|handle| (place, handle));
-        let gone = places(&config.lines).filter(|(name, _)| leaving.contains(name)).filter_map(handle);
-        let gone: Vec<_> = gone.collect();
+        let gone: Vec<_> = leaving.iter().filter_map(|name| fleet.drive(name)).collect();
         self.leave(leaving.iter().map(ToString::to_string).collect());
         let actions = fleet.remove(&leaving, config.shutdown).await;
         self.leave(Vec::new());
         // Whoever has to be heard goes with the motor that he has started and that was left turning.
-        let gone: Vec<_> =
-            gone.into_iter().map(|(place, handle)| Leaving::of(plant, place, &handle)).collect();
+        let gone: Vec<_> = gone.iter().map(|handle| Leaving::of(plant, handle)).collect();
         let mut leavings =
             std::mem::take(&mut *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner));
         leavings.retain(|before| gone.iter().all(|leaving| leaving.place != before.place));
@@ -461,7 +457,7 @@ fn add_all(
                 changes.iter().any(|change| change.added_drive() == Some(&*drive.settings.name))
             };
             builder = part.drives.iter().filter(is_added).fold(builder, |builder, drive| {
-                let place = place(&part.config.endpoint, drive.name);
+                let place = part.place(drive.name);
                 add(builder, part, drive, taken(leavings, kept, plant, &place, &drive.settings.name))
             });
         }
@@ -535,15 +531,16 @@ impl Source for Reloader {
 
 /// What is left of a drive that is not in the fleet any more.
 struct Leaving {
-    place: String,
+    place: Place,
     left: Left,
     /// Over who has started its motor, where that was left turning.
     watch: Option<Watch>,
 }
 
 impl Leaving {
-    fn of(plant: &Plant, place: String, drive: &DriveHandle) -> Self {
-        let (left, watch) = (drive.left(), plant.watched().take(drive.name()));
+    fn of(plant: &Plant, drive: &DriveHandle) -> Self {
+        let (left, place) = (drive.left(), drive.place().clone());
+        let watch = plant.watched().take(&place);
         let watch = watch.filter(|_| left.run.as_ref().is_some_and(|run| run.lease.is_some()));
         Self { place, left, watch }
     }
@@ -553,8 +550,8 @@ impl Leaving {
 type Leavings = Vec<Leaving>;
 
 /// Takes what is left of the drive at a place, which is called so now: by this run, or by one before it, in whose configuration it was.
-fn taken(leavings: &mut Leavings, kept: &Kept, plant: &Plant, place: &str, name: &str) -> Left {
-    let at = leavings.iter().position(|leaving| leaving.place == place);
+fn taken(leavings: &mut Leavings, kept: &Kept, plant: &Plant, place: &Place, name: &str) -> Left {
+    let at = leavings.iter().position(|leaving| leaving.place == *place);
     let Some(Leaving { left, watch, .. }) = at.map(|at| leavings.swap_remove(at)) else {
         if kept.runs(place) {
             plant.watched().put_kept(place, name);
@@ -564,7 +561,7 @@ fn taken(leavings: &mut Leavings, kept: &Kept, plant: &Plant, place: &str, name:
         return kept.of(place);
     };
     if let Some(watch) = watch {
-        plant.watched().put(name, watch);
+        plant.watched().put(place, name, watch);
     }
     left
 }

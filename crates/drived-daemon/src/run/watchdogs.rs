@@ -43,8 +43,8 @@ mod tests {
         let event = |kind| Event::now("pump 1", kind, Cause::Drive);
         let records = Records::open(None, &Places::default());
         assert!(note(&records, &event(verified.clone())) && !note(&records, &event(verified)));
-        assert_eq!(records.of("pump 1"), Some(before));
+        assert_eq!(records.of(&"pump 1".into()), Some(before));
         assert!(note(&records, &event(EventKind::WatchdogRestored(armed(10)))));
-        assert_eq!(records.of("pump 1"), None);
+        assert_eq!(records.of(&"pump 1".into()), None);
     }
 }

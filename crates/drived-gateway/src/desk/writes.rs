@@ -17,7 +17,7 @@ use drived_doors::{
     audit::{Kind, Record},
 };
 use drived_plant::plant::{
-    commands::{Action, LONGEST_LIFETIME, OutcomeWord, Rejected, Request, Target},
+    commands::{Action, Expects, LONGEST_LIFETIME, OutcomeWord, Rejected, Request, Target},
     revisions::Subject,
     watched::WatchedDoor,
 };
@@ -69,6 +69,14 @@ impl Desk {
         stop.map(Stop)
     }
 
+    /// To whom a write to a unit goes.
+    pub(super) fn written(&self, unit: u8) -> Vec<DriveHandle> {
+        match self.drive(unit) {
+            None if unit == 0 && self.config.broadcast => self.drives(),
+            drive => drive.into_iter().collect(),
+        }
+    }
+
     /// Carries out a write.
     pub(crate) async fn write(
         &self,
@@ -77,20 +85,19 @@ impl Desk {
         unit: u8,
         ask: &Ask,
         stop: Option<Stop>,
+        drives: Vec<DriveHandle>,
     ) -> Answer {
         if !self.config.rights.stop || self.config.virtual_unit == Some(unit) {
             return Err(ExceptionCode::IllegalFunction);
         }
-        let drives = match self.drive(unit) {
-            None if unit == 0 && self.config.broadcast => self.drives(),
-            None => return Err(ExceptionCode::GatewayPathUnavailable),
-            Some(drive) => vec![drive],
-        };
+        if drives.is_empty() && (unit != 0 || !self.config.broadcast) {
+            return Err(ExceptionCode::GatewayPathUnavailable);
+        }
         let caller = self.caller(peer);
-        drives.iter().for_each(|drive| self.kept.forget(drive.name()));
+        drives.iter().for_each(|drive| self.kept.forget(drive.place()));
         let written = match (stop, &drives[..]) {
             (Some(stop), [drive]) => {
-                self.clients.write(peer, drive.name(), Word::WithoutRun);
+                self.clients.write(peer, drive.place(), Word::WithoutRun);
                 let stopped = self.stop(&caller, drive, stop.0, arrived).await;
                 match stopped {
                     Ok(()) => self.setpoint_beside(&caller, drive, ask, arrived).await,
@@ -99,7 +106,7 @@ impl Desk {
             }
             (Some(stop), drives) => {
                 let stops = drives.iter().map(|drive| {
-                    self.clients.write(peer, drive.name(), Word::WithoutRun);
+                    self.clients.write(peer, drive.place(), Word::WithoutRun);
                     self.stop(&caller, drive, stop.0, arrived)
                 });
                 join_all(stops).await.into_iter().collect()
@@ -109,7 +116,7 @@ impl Desk {
             }
             (None, _) => Err(Refusal::rule("to all units at once only a stop is carried out")),
         };
-        drives.iter().for_each(|drive| self.kept.forget(drive.name()));
+        drives.iter().for_each(|drive| self.kept.forget(drive.place()));
         written.map(|()| ask.confirmation()).map_err(|refusal| {
             self.tell_refusal(&caller, unit, ask, &refusal);
             refusal.code
@@ -163,7 +170,7 @@ impl Desk {
             id: None,
             target: Target::Drive(drive.name().to_string()),
             action: Action::Stop(mode.into()),
-            expects: None,
+            expects: Some(Expects::of(drive)),
             lifetime: LONGEST_LIFETIME,
             arrived,
         };
@@ -178,7 +185,8 @@ impl Desk {
                 Ok(view) => self.judged(drive, view.outcome, view.text.as_deref()),
                 Err(rejected) => Err(Refusal::rule(rejected.to_string())),
             },
-            _ = taken => Ok(()),
+            // A drive that has left shows nothing any more.
+            Some(_) = async { taken.await.stop.filter(|stop| stop.taken) } => Ok(()),
         }
     }
 
@@ -274,11 +282,11 @@ impl Desk {
                 self.start(peer, caller, drive, (direction, setpoint), action, (arrived, deadline)).await
             }
             Some(Intent::ResetFaults(_)) if shows_fault(drive) => {
-                self.clients.write(peer, drive.name(), Word::WithoutRun);
+                self.clients.write(peer, drive.place(), Word::WithoutRun);
                 self.order(caller, drive, Action::Reset, arrived, deadline).await
             }
             Some(step) => {
-                self.clients.write(peer, drive.name(), Word::WithoutRun);
+                self.clients.write(peer, drive.place(), Word::WithoutRun);
                 match step.stops().filter(|_| !stands(drive)) {
                     // It was started while this waited.
                     Some(mode) => self.stop(caller, drive, mode, arrived).await?,
@@ -305,7 +313,7 @@ impl Desk {
     ) -> Result<(), Refusal> {
         // Also whoever is heard for a motor that runs stays who he is.
         self.may_begin()?;
-        let before = self.clients.write(peer, drive.name(), Word::Run);
+        let before = self.clients.write(peer, drive.place(), Word::Run);
         let snapshot = drive.snapshot();
         let status = snapshot.fresh_status(Instant::now());
         let ours = status.and_then(|status| status.verdict).is_some_and(|verdict| verdict.is_in_force());
@@ -349,6 +357,7 @@ impl Desk {
         if !settings.control || !settings.commanders.allow(&self.config.name) {
             return Err(Refusal::rule(format!("{} may not command this drive", self.config.name)));
         }
+        self.is_still(drive)?;
         let Some(mut speaker) = self.speaker(drive) else { return Ok(()) };
         for (address, word) in ask.writes() {
             // A reset has nothing to reset here, and a setpoint is given behind it.
@@ -391,12 +400,19 @@ impl Desk {
             let what = format!("{}: {} = {word}", drive.name(), row.code);
             let record = self.audit.record(Record::new(Kind::Command, caller, what));
             record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
+            self.is_still(&drive)?;
             let written = timeout_at(deadline, drive.write_parameter(row, word)).await;
             let written = written.map_err(|_| pending(&drive))?;
             let written = written.map_err(|refused| Refusal::rule(format!("{}: {refused}", row.code)))?;
             self.plant.tell_written(caller, &drive, row, word, written.changed);
         }
         Ok(())
+    }
+
+    /// Whether a drive is the one that its unit meant, for what the plant does not judge.
+    fn is_still(&self, drive: &DriveHandle) -> Result<(), Refusal> {
+        let judged = self.plant.is_as_shown(&Expects::of(drive), &[drive.name().to_string()]);
+        judged.map_err(|otherwise| Refusal::rule(Rejected::Otherwise(otherwise).to_string()))
     }
 
     /// Gives an order to the fleet, and waits for what becomes of it as long as the client does.
@@ -423,7 +439,9 @@ impl Desk {
         let left = || deadline.saturating_duration_since(Instant::now());
         let lifetime = deadline.saturating_duration_since(arrived).min(LONGEST_LIFETIME);
         let target = Target::Drive(drive.name().to_string());
-        let request = Request { id: None, target, action, expects: None, lifetime, arrived };
+        // While it waits for the audit log, the name may become another motor's.
+        let expects = Some(Expects::of(drive));
+        let request = Request { id: None, target, action, expects, lifetime, arrived };
         let record = self.record(caller, drive, &request);
         record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
         match self.plant.command_asked_after(caller, request, asked_after, left()).await {

@@ -7,9 +7,14 @@ use drive_fleet::{EventKind, Received};
 use tokio::time::{Instant, sleep, timeout};
 
 use super::{ETA, Peer, plant, read};
-use crate::{config::GatewayConfig, desk::Desk};
+use crate::{
+    config::{GatewayConfig, Units},
+    desk::Desk,
+    framing::Frame,
+};
 use drived_doors::{
     Caller, Rights, Role,
+    audit::Audit,
     crowd::{Crowd, Limits},
 };
 use drived_plant::plant::{
@@ -364,6 +369,48 @@ async fn a_motor_that_somebody_else_starts_behind_a_stop_is_not_stopped_for_the_
     assert!(plant.machines[0].observe().running, "{told:?}");
     sleep(Duration::from_secs(60)).await;
     assert!(plant.machines[0].observe().running, "its run is not his");
+}
+
+/// A table of units names drives, and a reload may give a name to another motor.
+fn by_names(config: &mut GatewayConfig) {
+    let units = [1, 2].map(|unit| (unit, format!("pump {unit}")));
+    config.units = Units::Table(units.into());
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_write_that_waits_for_its_turn_goes_to_the_motor_that_its_unit_meant_when_it_came_or_to_none() {
+    let (plant, desk) = operated(2, by_names).await;
+    let mut peer = Peer::of(&desk);
+    for word in [300, 200] {
+        peer.send(1, &write(LFR, word)).await;
+    }
+    // The first is on the line, and the other one behind it.
+    sleep(Duration::from_millis(1)).await;
+    plant.exchange_names();
+    peer.answer().await;
+    assert_eq!(peer.answer().await.1, [0x86, 0x04]);
+    assert_eq!(plant.machines[1].peek(LFR), Some(0), "it is called so now, and was not meant");
+    assert_eq!(peer.ask(1, &write(LFR, 250)).await, write(LFR, 250));
+    assert_eq!(plant.machines[1].peek(LFR), Some(250), "who writes now means it");
+}
+
+/// In real time: the disk knows no other.
+#[tokio::test]
+async fn a_write_that_waits_for_the_disk_of_the_audit_log_moves_nothing_of_whoever_has_the_name_by_then() {
+    let (plant, desk) = operated(2, by_names).await;
+    let folder = drived_config::testing::Folder::new("gateway-audit");
+    let audit = Audit::open(&folder.file("audit.jsonl")).unwrap();
+    let desk = Desk::new(desk.config.clone(), plant.plant.clone(), audit, super::names(&plant));
+    let frame = Frame { transaction: 1, unit: 1, pdu: write(LFR, 300) };
+    let client = "10.0.0.7".parse().unwrap();
+    let mut written = std::pin::pin!(desk.answer(client, desk.look_at(Instant::now(), &frame)));
+    let at_once = futures_util::future::poll_immediate(&mut written).await;
+    assert_eq!(at_once, None, "it waits for the disk");
+    plant.exchange_names();
+    let answer = written.await.unwrap();
+    assert_eq!(plant.machines[1].peek(LFR), Some(0), "it was not meant");
+    // A disk may have been as fast as nobody has seen one yet.
+    assert!(answer == [0x86, 0x04] || plant.machines[0].peek(LFR) == Some(300), "{answer:02X?}");
 }
 
 /// A motor that runs by a client that has to be heard every five seconds, or is stopped where told so; it goes on asking.

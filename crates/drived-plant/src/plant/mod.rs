@@ -324,7 +324,9 @@ impl Plant {
     pub fn renamed(&self, old: &str, new: &str) {
         self.0.history.rename(old, new);
         self.rename_alarms(old, new);
-        self.0.watched.rename(old, new);
+        if let Some(drive) = self.0.fleet.drive(new) {
+            self.0.watched.call(drive.place(), new);
+        }
     }
 
     /// The last ten minutes of a drive.

@@ -78,6 +78,16 @@ impl TestPlant {
     }
 }
 
+impl TestPlant {
+    /// As a reload does that exchanges the names of `pump 1` and `pump 2`.
+    pub fn exchange_names(&self) {
+        for (old, new) in [("pump 1", "neither"), ("pump 2", "pump 1"), ("neither", "pump 2")] {
+            self.plant.fleet().rename(old, DriveSettings::controlled(new)).expect("nobody has the name");
+            self.plant.renamed(old, new);
+        }
+    }
+}
+
 /// A drive as the API tells it, of which little is known.
 pub fn told(name: &str) -> serde_json::Value {
     serde_json::json!({

@@ -10,7 +10,7 @@ use std::{
 };
 
 use drive_core::{Status, StopMode};
-use drive_fleet::DriveHandle;
+use drive_fleet::{DriveHandle, Place};
 use serde::{Deserialize, Serialize};
 use tokio::{
     sync::watch,
@@ -78,8 +78,8 @@ impl Starter {
 /// The watch over who has started a drive.
 #[derive(Debug, Clone)]
 pub struct Watch {
-    /// Where the drive is.
-    place: Arc<str>,
+    /// What the drive is called.
+    drive: String,
     starter: Starter,
     /// Since when he is watched by this program.
     began: Instant,
@@ -91,9 +91,9 @@ pub struct Watch {
 }
 
 impl Watch {
-    fn begin(place: Arc<str>, starter: Starter) -> Self {
+    fn begin(drive: &str, starter: Starter) -> Self {
         let now = Instant::now();
-        Self { place, starter, began: now, heard: now, is_told: false, is_stopped: false }
+        Self { drive: drive.to_owned(), starter, began: now, heard: now, is_told: false, is_stopped: false }
     }
 }
 
@@ -103,11 +103,11 @@ struct Silent {
     starter: Starter,
 }
 
-/// Who has to be heard, by the name of the drive that he has started last.
+/// Who has to be heard, by the place of the drive that he has started last: a motor turns on whatever it is called.
 #[derive(Debug)]
 pub struct Watched {
     kept: Option<Records<Starter>>,
-    drives: Mutex<BTreeMap<String, Watch>>,
+    drives: Mutex<BTreeMap<Place, Watch>>,
     /// How often that has changed which is kept, and up to which change it is in the file.
     changed: watch::Sender<u64>,
     written: watch::Sender<u64>,
@@ -127,12 +127,11 @@ impl Default for Watched {
 impl Watched {
     /// Those of this state folder whose runs were not ended; without one they live as long as the program. They count as silent from
     /// now on, until they are heard.
-    pub fn in_folder(folder: Option<&Path>, places: &Places, runs: impl Fn(&str) -> bool) -> Self {
+    pub fn in_folder(folder: Option<&Path>, places: &Places, runs: impl Fn(&Place) -> bool) -> Self {
         let Some(file) = in_folder(folder, FILE) else { return Self::default() };
         let kept = Records::<Starter>::open(Some(&file), places);
         let all = kept.all().into_iter().filter(|(place, ..)| runs(place));
-        let drives =
-            all.map(|(place, drive, starter)| (drive, Watch::begin(Arc::from(place), starter))).collect();
+        let drives = all.map(|(place, drive, starter)| (place, Watch::begin(&drive, starter))).collect();
         Self { kept: Some(kept), drives: Mutex::new(drives), ..Self::default() }
     }
 
@@ -168,7 +167,6 @@ impl Watched {
 
     /// A client is about to start a drive by a door. It is kept when this ends, or cannot be soon.
     pub async fn start(&self, door: WatchedDoor<'_>, client: IpAddr, drive: &DriveHandle) {
-        let name: &str = drive.name();
         let starter = door.limit.map(|limit| Starter {
             door: door.name.to_owned(),
             listen: door.listen,
@@ -179,11 +177,9 @@ impl Watched {
         let (mut is_kept, change) = {
             let mut drives = self.lock();
             let before = match starter.clone() {
-                Some(starter) => {
-                    drives.insert(name.to_owned(), Watch::begin(Arc::clone(drive.place()), starter))
-                }
+                Some(starter) => drives.insert(drive.place().clone(), Watch::begin(drive.name(), starter)),
                 // Whoever starts it now needs not be heard.
-                None => drives.remove(name),
+                None => drives.remove(drive.place()),
             };
             if before.map(|before| before.starter) == starter {
                 return;
@@ -204,14 +200,14 @@ impl Watched {
             return;
         }
         for drive in drives {
-            if let Some(watch) = watched.get_mut(&**drive.name()) {
+            if let Some(watch) = watched.get_mut(drive.place()) {
                 watch.is_stopped = true;
             }
         }
     }
 
     /// A drive is to be started. Who started it before a stop is not the one who has to be heard.
-    pub(super) fn start_anew(&self, drive: &str) {
+    pub(super) fn start_anew(&self, drive: &Place) {
         let mut drives = self.lock();
         if drives.get(drive).is_some_and(|watch| watch.is_stopped) {
             drives.remove(drive);
@@ -219,17 +215,16 @@ impl Watched {
         }
     }
 
-    /// A drive is called otherwise.
-    pub(super) fn rename(&self, old: &str, new: &str) {
-        let mut drives = self.lock();
-        if let Some(watch) = drives.remove(old) {
-            drives.insert(new.to_owned(), watch);
+    /// The drive at a place is called otherwise.
+    pub(super) fn call(&self, place: &Place, drive: &str) {
+        if let Some(watch) = self.lock().get_mut(place) {
+            drive.clone_into(&mut watch.drive);
             self.change();
         }
     }
 
-    /// A drive has left the fleet: the watch over who has started it, for when it comes again by whatever name.
-    pub fn take(&self, drive: &str) -> Option<Watch> {
+    /// A drive has left the fleet: the watch over who has started it, for when it comes again.
+    pub fn take(&self, drive: &Place) -> Option<Watch> {
         let watch = self.lock().remove(drive);
         if watch.is_some() {
             self.change();
@@ -238,25 +233,25 @@ impl Watched {
     }
 
     /// A drive comes again whose motor was left turning.
-    pub fn put(&self, drive: &str, watch: Watch) {
-        self.lock().insert(drive.to_owned(), Watch { began: Instant::now(), ..watch });
+    pub fn put(&self, place: &Place, drive: &str, watch: Watch) {
+        self.lock().insert(place.clone(), Watch { drive: drive.to_owned(), began: Instant::now(), ..watch });
         self.change();
     }
 
     /// A drive comes whose motor an earlier run has left turning: whoever had to be heard then has to be heard now.
-    pub fn put_kept(&self, place: &str, drive: &str) {
+    pub fn put_kept(&self, place: &Place, drive: &str) {
         let Some(kept) = &self.kept else { return };
         kept.call(place, drive);
         if let Some(starter) = kept.of(place) {
-            self.put(drive, Watch::begin(Arc::from(place), starter));
+            self.put(place, drive, Watch::begin(drive, starter));
         }
     }
 
     /// Who is silent and has not been told yet. Who has started nothing that still runs is forgotten.
-    fn look(&self, now: Instant, find: impl Fn(&str) -> Option<DriveHandle>) -> Vec<Silent> {
+    fn look(&self, now: Instant, find: impl Fn(&Place) -> Option<DriveHandle>) -> Vec<Silent> {
         let (mut silent, mut is_less) = (Vec::new(), false);
         self.lock().retain(|drive, watch| {
-            // It is about to be called otherwise, or to come again.
+            // It is about to come again.
             let Some(drive) = find(drive) else { return true };
             let snapshot = drive.snapshot();
             if !snapshot.started_here() {
@@ -278,8 +273,8 @@ impl Watched {
         silent
     }
 
-    /// What follows from a silence is done. Where the drive is called otherwise meanwhile it is done again.
-    fn tell(&self, drive: &str) {
+    /// What follows from a silence is done.
+    fn tell(&self, drive: &Place) {
         if let Some(watch) = self.lock().get_mut(drive) {
             watch.is_told = true;
         }
@@ -290,7 +285,7 @@ impl Watched {
         *self.changed.borrow()
     }
 
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<String, Watch>> {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<Place, Watch>> {
         self.drives.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -317,8 +312,8 @@ impl Plant {
                 let Some(kept) = inner.watched.kept.clone() else { return };
                 let change = {
                     let drives = inner.watched.lock();
-                    let starter = |(drive, watch): (&String, &Watch)| {
-                        (watch.place.to_string(), drive.clone(), watch.starter.clone())
+                    let starter = |(place, watch): (&Place, &Watch)| {
+                        (place.clone(), watch.drive.clone(), watch.starter.clone())
                     };
                     kept.set_all(drives.iter().map(starter));
                     *changed.borrow_and_update()
@@ -339,7 +334,7 @@ impl Plant {
         loop {
             looks.tick().await;
             let (now, fleet) = (Instant::now(), self.fleet());
-            for Silent { drive, starter } in self.0.watched.look(now, |name| fleet.drive(name)) {
+            for Silent { drive, starter } in self.0.watched.look(now, |place| fleet.drive_at(place)) {
                 let Starter { door, client, .. } = &starter;
                 let name = drive.name();
                 let text = format!("{client} started it and has been silent for {:?}", starter.limit());
@@ -353,7 +348,7 @@ impl Plant {
                 });
                 self.revisions().push(Subject::Event, &event);
                 if !starter.stops {
-                    self.0.watched.tell(name);
+                    self.0.watched.tell(drive.place());
                     continue;
                 }
                 // Nobody has asked for it: it is this program's policy.
@@ -372,7 +367,7 @@ impl Plant {
                 };
                 // Nobody waits for it: the fleet repeats it until it is confirmed.
                 match self.begin(&caller, request) {
-                    Ok(_) => self.0.watched.tell(name),
+                    Ok(_) => self.0.watched.tell(drive.place()),
                     Err(rejected) => tracing::warn!("{name}: the stop is given again: {rejected}"),
                 }
             }
@@ -392,9 +387,9 @@ mod tests {
         let (folder, test) = (Folder::new("watched"), TestPlant::of(1).await);
         let place = folder.file("");
         let pump = test.plant.fleet().drive("pump 1").unwrap();
-        let there: Places = [("pump 1".to_owned(), pump.place().to_string())].into_iter().collect();
+        let there: Places = [("pump 1".to_owned(), pump.place().clone())].into_iter().collect();
         let open = |runs: bool| Watched::in_folder(Some(&place), &there, move |_| runs);
-        let known = |watched: &Watched| watched.lock().keys().cloned().collect::<Vec<_>>();
+        let known = |watched: &Watched| watched.lock().keys().map(Place::to_string).collect::<Vec<_>>();
         let kept = KeptAlarms::default();
         let plant = Plant::start_with(test.plant.fleet(), Vec::new(), false, &kept, open(true));
         let keeping = plant.keep_watched();
@@ -406,7 +401,7 @@ mod tests {
         };
         let client = "10.0.0.7".parse().unwrap();
         plant.watched().start(door(Some(Duration::from_secs(4))), client, &pump).await;
-        assert_eq!(known(&open(true)), ["pump 1"]);
+        assert_eq!(known(&open(true)), ["north atv312@1"]);
         assert!(known(&open(false)).is_empty());
         // Whoever starts it by a door where nobody has to be heard is not watched.
         plant.watched().start(door(None), client, &pump).await;

@@ -8,7 +8,7 @@ use std::{
 };
 
 use drive_fleet::{
-    RunRecord,
+    Place, RunRecord,
     alarms::{Alarm, Alarms},
 };
 use serde::{Deserialize, Serialize};
@@ -41,7 +41,7 @@ pub struct KeptAlarms {
 }
 
 /// By the names of the drives.
-type DrivePlaces = BTreeMap<String, String>;
+type DrivePlaces = BTreeMap<String, Place>;
 
 /// As it stands in the file.
 #[derive(Serialize, Deserialize)]
@@ -90,7 +90,7 @@ fn names(alarms: &Alarms, places: &DrivePlaces, there: &Places) -> BTreeMap<Stri
         let of_drive = |alarm: &&Alarm| alarm.drive.as_deref() == Some(name);
         alarms.all().iter().filter(of_drive).any(|alarm| alarm.kind.is_of_motion())
     };
-    let now = |(name, place): (&String, &String)| {
+    let now = |(name, place): (&String, &Place)| {
         // Such an alarm goes with the stop.
         let now = there.now(name, Some(place), of_motion(name)).and_then(|place| there.name_at(place));
         let now = match now {
@@ -148,7 +148,7 @@ async fn write(plant: &Weak<Inner>, file: &Kept, places: &mut DrivePlaces) -> Op
     let drives = alarms.all().iter().filter_map(|alarm| alarm.drive.clone());
     let place = |drive: String| {
         // Of one that is gone it is known from when it was there.
-        let now = inner.fleet.drive(&drive).map(|known| known.place().to_string());
+        let now = inner.fleet.drive(&drive).map(|known| known.place().clone());
         now.or_else(|| places.get(&drive).cloned()).map(|place| (drive, place))
     };
     *places = drives.filter_map(place).collect();

@@ -2,7 +2,7 @@
 
 use std::{fs, time::Duration};
 
-use drive_fleet::{ConcernKind, alarms::AlarmState};
+use drive_fleet::{ConcernKind, Place, alarms::AlarmState};
 use drive_sim::SimSlave;
 use tokio::time::sleep;
 
@@ -108,30 +108,32 @@ async fn a_program_that_is_started_anew_has_the_alarms_with_their_notes_and_a_tr
 
 #[tokio::test(start_paused = true)]
 async fn an_alarm_is_of_its_machine_where_the_names_were_exchanged_in_the_file_behind_a_kill() {
+    // Where the plant of the tests has them.
+    const ONE: &str = "north atv312@1";
+    const TWO: &str = "north atv312@2";
     let folder = Folder::new("alarms-exchanged");
     let places = |drives: &[(&str, &str)]| {
-        let drives = drives.iter().map(|(name, place)| ((*name).to_owned(), (*place).to_owned()));
-        drives.collect::<Places>().after(["pump 1", "pump 2"].map(str::to_owned))
+        let drives = drives.iter().map(|(name, place)| ((*name).to_owned(), Place::from(*place)));
+        drives.collect::<Places>().after([ONE, TWO].map(Place::from))
     };
     let kept = |there: &Places| KeptAlarms::in_folder(Some(&folder.file("")), there);
     let drives = |kept: &KeptAlarms| -> Vec<String> {
         kept.alarms.all().iter().filter_map(|alarm| alarm.drive.clone()).collect()
     };
-    // Who says no place is at his name.
-    let there = places(&[("pump 1", "pump 1"), ("pump 2", "pump 2")]);
+    let there = places(&[("pump 1", ONE), ("pump 2", TWO)]);
     let test = TestPlant::keeping(2, &kept(&there)).await;
     let keeping = test.plant.keep_alarms(kept(&there));
     tripped(&test).await;
     test.plant.close_alarms();
     keeping.await.unwrap();
     assert_eq!(drives(&kept(&there)), ["pump 1"]);
-    let exchanged = kept(&places(&[("pump 2", "pump 1"), ("pump 1", "pump 2")]));
+    let exchanged = kept(&places(&[("pump 2", ONE), ("pump 1", TWO)]));
     assert_eq!(drives(&exchanged), ["pump 2"]);
     // The name is another machine's now, and nobody is where it was.
-    let other = kept(&places(&[("pump 1", "pump 2")]));
-    assert_eq!(drives(&other), ["pump 1 at pump 1"]);
+    let other = kept(&places(&[("pump 1", TWO)]));
+    assert_eq!(drives(&other), ["pump 1 at north atv312@1"]);
     // Neither is there.
-    let neither = kept(&places(&[("pump 2", "pump 2")]));
+    let neither = kept(&places(&[("pump 2", TWO)]));
     assert_eq!(drives(&neither), ["pump 1"]);
 }
 

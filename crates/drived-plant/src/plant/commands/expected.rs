@@ -3,15 +3,12 @@
 //! A name is who it is by the configuration of the moment, and a question to a person may stand for long. What stays with a motor
 //! is its place: the port, the family and the address at which it is asked.
 
-use std::collections::HashMap;
-
 use drive_core::{Frequency, Setpoint};
-use drive_fleet::DriveHandle;
+use drive_fleet::{DriveHandle, Place};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{Plant, Target};
-use crate::plant::views::place_of;
 use drived_config::config::Group;
 
 /// Between a reference that was shown and the one of now, where the drive follows what it was given elsewhere: an analog input
@@ -34,7 +31,8 @@ pub struct Expects {
 struct AsShown {
     name: String,
     /// Its `place`.
-    place: String,
+    #[schemars(with = "String")]
+    place: Place,
     /// The setpoint that was shown: the drive's `setpoint`, or else the `reference_hz` of its status. Not looked at unless it is said.
     setpoint: Option<Setpoint>,
 }
@@ -60,14 +58,24 @@ pub enum Otherwise {
     SetpointComing { drive: String, coming: Setpoint },
 }
 
+impl Expects {
+    /// This drive, whatever its setpoint: for what may have to wait before it is begun.
+    pub fn of(drive: &DriveHandle) -> Self {
+        Self { drives: vec![AsShown::of(drive)] }
+    }
+}
+
+impl AsShown {
+    fn of(drive: &DriveHandle) -> Self {
+        Self { name: drive.name().to_string(), place: drive.place().clone(), setpoint: None }
+    }
+}
+
 impl Plant {
     /// Those that are meant now, for a command that has to wait before it is begun; `None`: one of them is not there.
     pub fn as_it_is(&self, target: &Target) -> Option<Expects> {
         let (fleet, names) = (self.fleet(), self.named(&self.groups(), target).ok()?);
-        let shown = |name: String| {
-            let place = place_of(&fleet.drive(&name)?);
-            Some(AsShown { name, place, setpoint: None })
-        };
+        let shown = |name: String| Some(AsShown::of(&fleet.drive(&name)?));
         Some(Expects { drives: names.into_iter().map(shown).collect::<Option<_>>()? })
     }
 
@@ -90,11 +98,11 @@ impl Plant {
         let coming = self.0.commands.setpoints_under_way();
         for shown in &expects.drives {
             let drive = match fleet.drive(&shown.name) {
-                Some(drive) if place_of(&drive) == shown.place => drive,
+                Some(drive) if *drive.place() == shown.place => drive,
                 other => {
                     let was = shown.name.clone();
-                    return Err(match (self.name_at(&shown.place), other) {
-                        (Some(now), _) => Otherwise::Renamed { was, now },
+                    return Err(match (fleet.drive_at(&shown.place), other) {
+                        (Some(now), _) => Otherwise::Renamed { was, now: now.name().to_string() },
                         (None, Some(_)) => Otherwise::Another(was),
                         (None, None) => Otherwise::Gone(was),
                     });
@@ -126,21 +134,13 @@ impl Plant {
             return target;
         }
         let mut names = self.named(groups, &target).unwrap_or_default();
-        let named = names.len();
-        let drives = self.fleet().drives();
-        let at: HashMap<String, &DriveHandle> = drives.iter().map(|drive| (place_of(drive), drive)).collect();
-        for drive in expects.drives.iter().filter_map(|shown| at.get(&shown.place)) {
+        let (named, fleet) = (names.len(), self.fleet());
+        for drive in expects.drives.iter().filter_map(|shown| fleet.drive_at(&shown.place)) {
             if !names.iter().any(|name| **name == **drive.name()) {
                 names.push(drive.name().to_string());
             }
         }
         if names.len() == named { target } else { Target::Selected(names) }
-    }
-
-    /// The name of whoever stands there now.
-    fn name_at(&self, place: &str) -> Option<String> {
-        let drives = self.fleet().drives();
-        drives.iter().find(|drive| place_of(drive) == place).map(|drive| drive.name().to_string())
     }
 }
 

@@ -17,7 +17,7 @@ use std::{
 };
 
 use drive_core::{Direction, Setpoint};
-use drive_fleet::{DriveHandle, StopOrder, Until};
+use drive_fleet::{DriveHandle, Place, StopOrder, Until};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::{
@@ -277,7 +277,7 @@ impl Plant {
         }
         passing.may_begin(caller, &request, asked_after, meant.drives())?;
         if matches!(request.action, Action::Start { .. }) {
-            meant.drives().iter().for_each(|drive| self.0.watched.start_anew(drive.name()));
+            meant.drives().iter().for_each(|drive| self.0.watched.start_anew(drive.place()));
         }
         let work = Work::new(self.clone(), caller, &request, meant);
         match self.0.commands.find_or_add(caller, request, work.view())? {
@@ -377,7 +377,15 @@ impl Plant {
 
 /// When a stop was last asked of each drive, by whichever face: what was asked before it is not begun after it.
 #[derive(Default)]
-pub(super) struct Stopped(Mutex<HashMap<Arc<str>, LastStop>>);
+pub(super) struct Stopped(Mutex<LastStops>);
+
+/// A stop is of the machine, whatever that is called by now. It is of the name besides: who asked for a start before it meant the machine
+/// that had the name then.
+#[derive(Default)]
+struct LastStops {
+    by_place: HashMap<Place, LastStop>,
+    by_name: HashMap<Arc<str>, LastStop>,
+}
 
 /// The last stop of a drive.
 struct LastStop {
@@ -388,7 +396,7 @@ struct LastStop {
 }
 
 /// Nothing else passes while this is there.
-struct Passing<'a>(MutexGuard<'a, HashMap<Arc<str>, LastStop>>);
+struct Passing<'a>(MutexGuard<'a, LastStops>);
 
 impl Stopped {
     fn pass(&self) -> Passing<'_> {
@@ -401,11 +409,15 @@ impl Passing<'_> {
     fn note(&mut self, caller: &Caller, drives: &[DriveHandle]) {
         // What was asked for until now came before each of them.
         let (at, origin) = (Instant::now(), Arc::<str>::from(&*caller.origin));
-        for drive in drives {
-            let last = self.0.get(drive.name());
+        let stop = |last: Option<&LastStop>| {
             let from_elsewhere = last.and_then(|last| last.before(&origin));
-            let stop = LastStop { at, origin: Arc::clone(&origin), from_elsewhere };
-            self.0.insert(Arc::clone(drive.name()), stop);
+            LastStop { at, origin: Arc::clone(&origin), from_elsewhere }
+        };
+        let LastStops { by_place, by_name } = &mut *self.0;
+        for drive in drives {
+            let (place, name) = (drive.place(), drive.name());
+            by_place.insert(place.clone(), stop(by_place.get(place)));
+            by_name.insert(Arc::clone(name), stop(by_name.get(name)));
         }
     }
 
@@ -417,11 +429,14 @@ impl Passing<'_> {
         asked_after: Instant,
         drives: &[DriveHandle],
     ) -> Result<(), Rejected> {
+        let overtakes = |last: &LastStop| {
+            let from_elsewhere = last.before(&caller.origin);
+            last.at > request.arrived || from_elsewhere.is_some_and(|at| at > asked_after)
+        };
+        let LastStops { by_place, by_name } = &*self.0;
         let is_overtaken = |drive: &&DriveHandle| {
-            self.0.get(drive.name()).is_some_and(|last| {
-                let from_elsewhere = last.before(&caller.origin);
-                last.at > request.arrived || from_elsewhere.is_some_and(|at| at > asked_after)
-            })
+            let lasts = [by_place.get(drive.place()), by_name.get(drive.name())];
+            lasts.into_iter().flatten().any(overtakes)
         };
         match drives.iter().find(is_overtaken) {
             Some(drive) => Err(Rejected::Stopped(drive.name().to_string())),
@@ -450,7 +465,7 @@ async fn settled(mut told: Told, wait: Duration) -> Arc<CommandView> {
 
 #[cfg(test)]
 mod tests {
-    use drive_core::StopMode;
+    use drive_core::{Frequency, StopMode};
     use drive_fleet::{EventKind, Outcome, Received, Refused};
     use tokio::{sync::mpsc, task::spawn_blocking, time::advance};
 
@@ -571,6 +586,32 @@ mod tests {
         let expected = ["scada", "beside"].into_iter().cycle();
         let late = commanders.iter().zip(expected).position(|(commander, expected)| **commander != *expected);
         assert_eq!(late, None, "the stop that was taken first was overtaken");
+    }
+
+    /// A start of before a stop that was held up, such as at a door whose thread had no turn, comes behind a reload.
+    #[tokio::test(start_paused = true)]
+    async fn a_start_of_before_a_stop_starts_nothing_where_the_names_were_exchanged_between_both() {
+        for held_up in ["pump 2", "pump 1"] {
+            let test = TestPlant::of(2).await;
+            let caller = Caller::new("page", "page", Rights::ALL);
+            let request = |name: &str, action, arrived| {
+                let (id, target) = (None, Target::Drive(name.to_owned()));
+                Request { id, target, action, expects: None, lifetime: LONGEST_LIFETIME, arrived }
+            };
+            let setpoint = Some(Frequency::from_hertz(20).into());
+            let (direction, until) = (Direction::Forward, Until::default());
+            let start = Action::Start { direction, setpoint, until };
+            let before = Instant::now();
+            advance(Duration::from_millis(10)).await;
+            let stop = request("pump 1", Action::Stop(StopMode::Ramp.into()), Instant::now());
+            test.plant.command(&caller, stop, Duration::from_secs(3)).await.unwrap();
+            test.exchange_names();
+            // By the name that the stopped machine has now, or by that which it had.
+            let begun = test.plant.begin(&caller, request(held_up, start, before));
+            assert_eq!(begun.err(), Some(Rejected::Stopped(held_up.to_owned())), "{held_up}");
+            let later = test.plant.command(&caller, request(held_up, start, Instant::now()), LIFETIME).await;
+            assert_eq!(later.unwrap().outcome, OutcomeWord::Confirmed, "what is asked behind it is done");
+        }
     }
 
     #[test]

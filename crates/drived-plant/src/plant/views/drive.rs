@@ -2,7 +2,6 @@
 
 use std::{borrow::Cow, sync::Arc};
 
-use drive_bus::Endpoint;
 use drive_core::{Measurements, Status};
 use drive_families::Family;
 use drive_fleet::{
@@ -55,7 +54,7 @@ impl DriveView {
         Self {
             known_as,
             line: line.to_owned(),
-            place: place_of(drive),
+            place: drive.place().to_string(),
             slave: drive.slave().number(),
             family: drive.capabilities().key.into(),
             not_known: not_known(drive),
@@ -68,17 +67,6 @@ impl DriveView {
             snapshot: SnapshotView::from(&*drive.snapshot()),
         }
     }
-}
-
-/// At which machine the commands of a drive arrive, whatever it is called.
-pub fn place_of(drive: &DriveHandle) -> String {
-    let (line, port) = drive.line();
-    let port = match port.config().endpoint {
-        // One stream is told from another by its line alone.
-        Endpoint::Stream => line.to_string(),
-        port => port.to_string(),
-    };
-    format!("{port} {}@{}", drive.capabilities().key, drive.slave().number())
 }
 
 /// What its family says that nobody can know; nothing of a family that has no name here.

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 pub use self::{
     command::{CommandView, SeveralView},
-    drive::{DriveView, Gist, Shown, place_of},
+    drive::{DriveView, Gist, Shown},
     exchange::{ExchangeView, LineDetailView, ResultWord},
     line::{AnswerTimes, FindingView, LineErrors, LineLink, LineView, SlaveView},
     measured::{AnswersView, MeasuredLineView, PlannedLineView, SettingsView, StepView, TimesView},
