@@ -446,9 +446,9 @@ async fn given(drive: &mut dyn Drive, setpoint: Setpoint, start: Option<Directio
 async fn asked(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Reply {
     *drive.lifetimes_mut() = lifetimes(job, lifetime);
     match job {
-        Job::Stop(mode) => Reply::Stopped(drive.stop(mode).await),
+        Job::Stop(mode) => Reply::stopped(drive.slave(), mode, drive.stop(mode).await),
         Job::Withdraw => Reply::Withdrawn(drive.withdraw().await),
-        Job::Start(direction) => Reply::Ordered(drive.start(direction).await),
+        Job::Start(direction) => Reply::started(drive.slave(), direction, drive.start(direction).await),
         Job::SetSetpoint(setpoint, start) => Reply::Setpoint(given(drive, setpoint, start).await),
         Job::ResetFaults => Reply::Ordered(drive.reset_faults().await),
         Job::Release => Reply::Ordered(drive.release().await),

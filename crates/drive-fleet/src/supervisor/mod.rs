@@ -16,6 +16,7 @@ mod pace;
 mod permission;
 mod questions;
 mod retraction;
+mod shown;
 mod stopping;
 #[cfg(test)]
 mod tests;

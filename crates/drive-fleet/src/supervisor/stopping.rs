@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use drive_core::{
-    Command, Error, ErrorKind, Frequency, INJECTION_AT_MOST, Motion, Refusal, Result, Setpoint, StopMode,
-    Stopped,
+    Command, Error, ErrorKind, Frequency, INJECTION_AT_MOST, Motion, Refusal, Result, Setpoint, Status,
+    StopMode, Stopped,
 };
 use tokio::time::Instant;
 
-use super::{Asker, CallId, Job, Output, Supervisor, verdict::status_of};
+use super::{Asker, CallId, Job, Output, Supervisor, shown::who_runs, verdict::status_of};
 use crate::{
     cause::Cause,
     event::EventKind,
@@ -69,6 +69,12 @@ pub(super) struct Stopping {
     next_try: Option<Instant>,
     pause: Duration,
     error: Option<Error>,
+    /// The motor ran again behind it.
+    was_undone: bool,
+    /// By whose run command it did, as far as the drive told.
+    runs_by: Option<Refusal>,
+    /// Until when the drive may be without it before that is an alarm.
+    patient_until: Instant,
     /// When its lack of confirmation becomes an alarm; `None` when it has.
     alarm_at: Option<Instant>,
     waiters: Vec<Waiter>,
@@ -112,13 +118,38 @@ impl Stopping {
         self.next_try = Some(now);
     }
 
-    /// The motor comes down by itself. As long as it does, its time begins anew: a long ramp is no alarm, a ramp that hangs is.
+    /// The drive shows that no run command is in force: from here the motor comes down by itself and needs its time, which counts
+    /// from when the stop was given, however often it is taken.
+    fn takes(&mut self, now: Instant, standstill: Duration) {
+        self.taken = true;
+        self.alarm_at = self.alarm_at.map(|at| at.max(self.since + standstill));
+        for waiter in &mut self.waiters {
+            waiter.until = match waiter.asker.is_exit() {
+                true => waiter.until.min(now + standstill),
+                false => waiter.until.max(waiter.asked_at + standstill),
+            };
+        }
+    }
+
+    /// A run command has come behind it, kept back on its way or from somebody else: it is written again at once, and has no more time
+    /// than one that was never taken.
+    fn undone(&mut self, now: Instant, status: &Status) {
+        self.taken = false;
+        (self.was_undone, self.runs_by) = (true, who_runs(status));
+        self.next_try = Some(now);
+        self.alarm_at = self.alarm_at.map(|at| at.min(self.patient_until));
+    }
+
+    /// The motor comes down by itself. As long as it does, its time begins anew: a long ramp is no alarm, a ramp that hangs is. Not
+    /// behind a stop that was undone: what sinks between two run commands would have all the time that there is.
     fn comes_down(&mut self, now: Instant, output: Option<Frequency>, standstill: Duration) {
-        let Some(output) = output else { return };
-        let is_progress = self
-            .lowest
-            .is_none_or(|lowest| output.centihertz() + PROGRESS.centihertz() <= lowest.centihertz());
-        if is_progress {
+        let Some(output) = output.filter(|_| !self.was_undone) else { return };
+        let Some(lowest) = self.lowest else {
+            self.lowest = Some(output);
+            self.alarm_at = self.alarm_at.map(|at| at.min(now + HANGS));
+            return;
+        };
+        if output.centihertz() + PROGRESS.centihertz() <= lowest.centihertz() {
             self.lowest = Some(output);
             self.alarm_at = self.alarm_at.map(|_| now + standstill.min(HANGS));
             for waiter in &mut self.waiters {
@@ -239,6 +270,9 @@ impl Supervisor {
                     next_try: Some(now),
                     pause: REPEAT.0,
                     error: None,
+                    was_undone: false,
+                    runs_by: None,
+                    patient_until: now + patience,
                     alarm_at: Some(now + patience),
                     waiters: vec![waiter],
                 });
@@ -285,12 +319,7 @@ impl Supervisor {
                 stopping.error = None;
                 stopping.pause = REPEAT.0;
                 if !stopping.taken {
-                    stopping.taken = true;
-                    // From here the motor comes down by itself and needs its time.
-                    stopping.alarm_at = Some(now + standstill);
-                    for waiter in &mut stopping.waiters {
-                        waiter.until = now + standstill;
-                    }
+                    stopping.takes(now, standstill);
                 }
                 if let Some(other) = taken_from {
                     self.emit_by(EventKind::StopTookCommand(other), cause.clone());
@@ -321,7 +350,7 @@ impl Supervisor {
     /// What a new status says of a stop under way. Nothing is confirmed before the drive has taken it: a motor that stands for
     /// another reason may hold a run command.
     pub(super) fn judge_stop(&mut self, now: Instant) {
-        let Some(status) = &self.status else { return };
+        let Some(status) = self.status.clone() else { return };
         let (at, motion, output) = (status.at, status.value.motion, status.value.output_frequency);
         let standstill = self.settings.times.standstill;
         let (is_known, is_another) = (self.checks.stranger().is_none(), self.checks.is_another());
@@ -338,10 +367,8 @@ impl Supervisor {
                 stopping.go_on_by_ramp(now);
             }
             _ if crate::mutant!("untaken-stop-confirmed", !stopping.taken, false) => {}
-            // A run command has come behind the stop, kept back on its way or from somebody else.
             Motion::Driven if crate::mutant!("run-behind-a-stop-left", true, false) => {
-                stopping.taken = false;
-                stopping.next_try = Some(now);
+                stopping.undone(now, &status.value);
             }
             _ => {
                 if motion == Motion::Braking {
@@ -400,7 +427,9 @@ impl Supervisor {
         // Somebody has asked for it again since.
         stopping.waiters = later;
         stopping.since = stopping.asked_at;
-        stopping.alarm_at = Some(now + self.settings.times.standstill);
+        stopping.patient_until = stopping.since + self.settings.times.stop_alarm;
+        stopping.alarm_at = Some(stopping.since + self.settings.times.standstill);
+        (stopping.was_undone, stopping.runs_by, stopping.lowest) = (false, None, None);
         self.stopping = Some(stopping);
         self.pace.hurry(now);
         for (asker, modes) in confirmed {
@@ -448,10 +477,11 @@ impl Supervisor {
             (Some(status), None | Some(Error::NotConfirmed { .. })) if stopping.attempts > 0 => {
                 let after = now.saturating_duration_since(stopping.since);
                 let last = Some(status.seen(now));
-                let because = match &error {
+                let denied = match &error {
                     Some(Error::NotConfirmed { because, .. }) => *because,
                     _ => self.checks.is_another().then_some(Refusal::Exchanged),
                 };
+                let because = denied.or(stopping.runs_by);
                 Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because, stop })
             }
             // It never left: by what its driver knows, it is no stop of this drive.

@@ -8,7 +8,9 @@ mod eeprom;
 mod matrix;
 mod orders;
 mod questions;
+mod shown;
 mod stops;
+mod undone;
 
 use drive_core::{
     Command, Control, Direction, ExceptionMeaning, Exchange, Frequency, Identity, Lack, Lease, Measurements,
@@ -61,6 +63,8 @@ struct Paper {
     denies_watchdog: bool,
     /// It refuses the write of its watchdog: not now.
     refuses_watchdog: bool,
+    /// A stop brings it onto a ramp on which it stays.
+    ramps: bool,
     /// It refuses every stop: not now.
     refuses_stops: bool,
     /// No stop leaves for its line in time.
@@ -124,6 +128,7 @@ impl Paper {
             keeps_watchdog: false,
             denies_watchdog: false,
             refuses_watchdog: false,
+            ramps: false,
             refuses_stops: false,
             expires_stops: false,
             withholds_stops: None,
@@ -154,6 +159,12 @@ impl Paper {
         self.status.motion = Motion::AtRest;
         self.status.at_reference = Some(false);
         self.status.output_frequency = Some(Frequency::ZERO);
+    }
+
+    fn come_down(&mut self) {
+        self.status.state = State::Stopping;
+        self.status.motion = Motion::Braking;
+        self.status.at_reference = Some(false);
     }
 
     fn trip(&mut self, code: u16) {
@@ -221,14 +232,19 @@ impl Paper {
             }
             Job::Stop(asked) => {
                 if reached && self.obeys {
-                    self.stand();
+                    if self.ramps {
+                        self.come_down()
+                    } else {
+                        self.stand()
+                    }
                     self.lease = None;
                 }
                 let (mode, instead) = match self.stops_by {
                     Some((mode, why)) if mode != asked => (mode, Some(why)),
                     _ => (asked, None),
                 };
-                Reply::Stopped(self.status().map(|status| Stopped { instead, ..Stopped::by(mode, status) }))
+                let stopped = self.status().map(|status| Stopped { instead, ..Stopped::by(mode, status) });
+                Reply::stopped(slave(), asked, stopped)
             }
             Job::Withdraw if !self.withdraws => {
                 let (what, reason) = ("withdrawal of the run command", "a test");
@@ -257,7 +273,7 @@ impl Paper {
                     self.status.direction = Some(direction);
                     self.lease = Some(Lease::new(direction, 0x000F));
                 }
-                Reply::Ordered(self.status())
+                Reply::started(slave(), direction, self.status())
             }
             Job::SetSetpoint(setpoint, _) => {
                 if reached && self.obeys {
