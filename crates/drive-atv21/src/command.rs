@@ -39,8 +39,9 @@ impl<P: Port> Atv21<P> {
             self.registers.begin_order();
             return self.start_motor(direction, None).await;
         };
-        self.clear_other_reference(reference.0).await?;
-        let status = self.start_motor(direction, Some((slots, reference.1))).await?;
+        let has_cleared = self.clear_other_reference(reference.0).await?;
+        let started = self.start_motor(direction, Some((slots, reference.1))).await;
+        let status = started.map_err(|error| if has_cleared { error.after_write() } else { error })?;
         self.confirm_reference(setpoint, reference).await.map_err(Error::after_write)?;
         Ok(status)
     }

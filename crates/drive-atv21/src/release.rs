@@ -28,10 +28,11 @@ impl<P: Port> Atv21<P> {
         if let Some(reason) = terminals.would_start() {
             return Err(self.refused(Command::Release, reason));
         }
-        self.put_references_back().await?;
-        let held = self.command_word(Class::Command).await?;
+        let is_begun = self.put_references_back().await?;
+        let later = |error: Error| if is_begun { error.after_write() } else { error };
+        let held = self.command_word(Class::Command).await.map_err(later)?;
         let chosen = if self.selections.is_some() { CommandWord::empty() } else { CommandWord::SELECTIONS };
-        self.write_command_word(held & chosen & CommandWord::KEPT).await?;
+        self.write_command_word(held & chosen & CommandWord::KEPT).await.map_err(later)?;
         self.watch.run.end();
         let mut settling = Confirming::within(SETTLED_WITHIN);
         loop {
@@ -72,17 +73,20 @@ impl<P: Port> Atv21<P> {
     }
 
     /// Writes the references that stood in the drive before the first setpoint of this value: the terminals' next run
-    /// command may run at them (FMOD = 4).
-    async fn put_references_back(&mut self) -> Result<()> {
-        let Some([frequency, speed]) = self.references else { return Ok(()) };
+    /// command may run at them (FMOD = 4). Gives whether they were.
+    async fn put_references_back(&mut self) -> Result<bool> {
+        let Some([frequency, speed]) = self.references else { return Ok(false) };
         let mut both = [(map::FREQUENCY_REFERENCE, frequency), (map::SPEED_REFERENCE, speed)];
         // The one that counts may be the one that was written last.
         both.sort_by_key(|(_, word)| *word);
+        let mut is_begun = false;
         for (register, word) in both {
-            self.registers.at(Class::Command).write(register, word).await?;
+            let written = self.registers.at(Class::Command).write(register, word).await;
+            written.map_err(|error| if is_begun { error.after_write() } else { error })?;
+            is_begun = true;
         }
         self.proof.disagree();
         self.references = None;
-        Ok(())
+        Ok(is_begun)
     }
 }

@@ -26,16 +26,18 @@ impl<P: Port> Atv21<P> {
         self.check_own(Command::Setpoint(setpoint)).await?;
         let reference @ (register, word) = self.reference(setpoint).await?;
         self.check_reference(Command::Setpoint(setpoint)).await?;
-        self.clear_other_reference(register).await?;
+        let has_cleared = self.clear_other_reference(register).await?;
         let mut calls = self.registers.at(Class::Command).replacing(register.address());
-        calls.write(register, word).await?;
+        let written = calls.write(register, word).await;
+        // A motor that followed the other one comes down by that.
+        written.map_err(|error| if has_cleared { error.after_write() } else { error })?;
         self.registers.owe_judgement();
         self.confirm_reference(setpoint, reference).await.map_err(Error::after_write)
     }
 
     /// Sets the reference to 0 that is not to count: the manual does not say which of FA01 and FA13 does where both are
-    /// set. What both held before the first setpoint is remembered.
-    pub(crate) async fn clear_other_reference(&mut self, register: Register<ReadWrite>) -> Result<()> {
+    /// set. What both held before the first setpoint is remembered. Gives whether it was written.
+    pub(crate) async fn clear_other_reference(&mut self, register: Register<ReadWrite>) -> Result<bool> {
         let hertz = register.address() == map::FREQUENCY_REFERENCE.address();
         let other = if hertz { map::SPEED_REFERENCE } else { map::FREQUENCY_REFERENCE };
         self.proof.disagree();
@@ -48,7 +50,7 @@ impl<P: Port> Atv21<P> {
         if held != 0 {
             calls.write(other, 0).await?;
         }
-        Ok(())
+        Ok(held != 0)
     }
 
     /// The register and the word of a setpoint, if the drive's limits allow it.

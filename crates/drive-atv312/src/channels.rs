@@ -91,10 +91,12 @@ impl<P: Port> Atv312<P> {
         let words = self.check_standing(COMMAND).await?;
         if words.state_words().control() != Control::Bus && self.set_up_before.is_empty() {
             // The reference may be the bus's all the same: whoever commands finds no setpoint of before.
-            if self.registers.at(Class::Command).read(LFR).await? != 0 {
+            let stands = self.registers.at(Class::Command).read(LFR).await? != 0;
+            if stands {
                 self.registers.at(Class::Command).write(LFR, 0).await?;
             }
-            return self.fast_status(Class::Command).await;
+            let status = self.fast_status(Class::Command).await;
+            return status.map_err(|error| if stands { error.after_write() } else { error });
         }
         self.read_settings(Class::Command).await?;
         if self.known.settings.level() != Some(AccessLevel::L3) {

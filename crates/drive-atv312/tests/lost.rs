@@ -10,7 +10,7 @@ use drive_atv312::{Atv312, CAPABILITIES, exception_meaning, registers::LFR};
 use drive_core::{Class, Drive, ErrorKind, Port, PortError, Registers, Row, State, StopMode};
 use tokio_modbus::{ExceptionCode, Request, Response, Slave, client::Client, slave::SlaveContext};
 
-/// Answers every reading with zeros until something is written. The write's own answer may be lost, and nothing is sent
+/// Answers every reading with zeros, and that of the reference with 50 Hz, until something is written. The write's own answer may be lost, and nothing is sent
 /// any more behind it.
 #[derive(Debug)]
 struct Lost {
@@ -30,8 +30,9 @@ impl Client for Lost {
         let failed = |problem: PortError| Err(tokio_modbus::Error::Transport(problem.into_io()));
         match request {
             _ if self.written => failed(PortError::Expired),
-            Request::ReadHoldingRegisters(_, count) => {
-                Ok(Ok(Response::ReadHoldingRegisters(vec![0; usize::from(count)])))
+            Request::ReadHoldingRegisters(first, count) => {
+                let word = |register| if register == LFR.address() { 500 } else { 0 };
+                Ok(Ok(Response::ReadHoldingRegisters((first..first + count).map(word).collect())))
             }
             Request::WriteSingleRegister(register, word) => {
                 self.written = true;
@@ -62,6 +63,10 @@ async fn a_write_that_cannot_be_read_back_is_unknown_and_never_called_not_sent()
         let mut drive = Atv312::new(Lost { answers_write, written: false }, slave);
         let row = Row::find(drive.capabilities().rows, "ACC").unwrap();
         let error = drive.write_parameter(row, 50).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
+        // The terminals command it, and it is the reference of the bus that is taken back.
+        let mut drive = Atv312::new(Lost { answers_write, written: false }, slave);
+        let error = drive.release().await.unwrap_err();
         assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
     }
 }

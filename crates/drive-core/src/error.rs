@@ -313,6 +313,10 @@ pub enum Error {
         /// What keeps the command from being in force, where the drive tells it.
         because: Option<Refusal>,
     },
+    /// Its driver panicked in the call, and said this: a fault of the program and not of the drive. What the call was to write
+    /// may have been written.
+    #[error("its driver panicked: {0}")]
+    DriverPanicked(String),
 }
 
 /// What the drive showed instead: of a parameter the word that was read back, else its status.
@@ -375,7 +379,9 @@ impl Error {
     #[must_use]
     pub const fn kind(&self) -> ErrorKind {
         match self {
-            Self::Port { problem: PortError::OutcomeUnknown(_), .. } => ErrorKind::OutcomeUnknown,
+            Self::Port { problem: PortError::OutcomeUnknown(_), .. } | Self::DriverPanicked(_) => {
+                ErrorKind::OutcomeUnknown
+            }
             Self::Port { problem, .. } if problem.nothing_sent() => ErrorKind::NotSent,
             Self::Port { .. } => ErrorKind::NoAnswer,
             Self::Exception { meaning, exchange, .. } if exchange.is_write() && !meaning.denies() => {

@@ -265,6 +265,9 @@ pub enum EventKind {
     CommandOverridden(Refusal),
     /// What a contract with the drive rests on has changed without this side: it is looked at anew.
     ContractChanged(Ground),
+    /// **Alarm**: its driver has panicked in a call, which is a fault of the program: what it said of that. That call has failed; the drive is asked
+    /// and stopped as ever. Told once of each that says something else, until the drive is found anew.
+    DriverPanicked(String),
     /// A second, different answer came to the question that its last status has answered: what that showed counts for nothing.
     ValueWithdrawn,
     /// The line has found something wrong by what it has heard, or does not find it any more. What concerns no single slave is told
@@ -328,6 +331,7 @@ impl EventKind {
             Self::ReferenceTaken(_) => "reference taken",
             Self::CommandOverridden(_) => "command overridden",
             Self::ContractChanged(_) => "contract changed",
+            Self::DriverPanicked(_) => "driver panicked",
             Self::ValueWithdrawn => "value withdrawn",
             Self::LineFinding { .. } => "line finding",
             Self::RunAdopted(_) => "run adopted",
@@ -360,6 +364,7 @@ impl EventKind {
                 | Self::WatchdogNotInForce(_)
                 | Self::StopUnconfirmed { .. }
                 | Self::RunCommandStands(_)
+                | Self::DriverPanicked(_)
                 | Self::OutputBlocked(_)
                 | Self::ReferenceTaken(_)
                 | Self::CommandOverridden(_)
@@ -451,6 +456,7 @@ impl fmt::Display for EventKind {
                 write!(f, ": {because}")
             }
             Self::ContractChanged(ground) => write!(f, ": {ground}"),
+            Self::DriverPanicked(said) => write!(f, ", a fault of the program: {said}"),
             Self::ValueWithdrawn => f.write_str(": another answer came to the same question"),
             Self::LineFinding { finding, present } => {
                 let whose = if finding.slave.is_some() { "" } else { "the line: " };

@@ -3,6 +3,7 @@
 use std::{
     borrow::Cow,
     collections::HashMap,
+    convert::identity,
     fmt,
     sync::{
         Arc,
@@ -84,11 +85,34 @@ pub struct GroupStart {
     pub until: Until,
 }
 
+impl GroupStart {
+    /// What is told of it when nobody carries it out any more, by what became of what each member was given last.
+    fn abandoned(&self, outcomes: Vec<(Arc<str>, Outcome)>) -> GroupFailure {
+        let refused = outcomes.iter().map(|(name, outcome)| match outcome {
+            Outcome::Refused(refused) => Some((Arc::clone(name), refused.clone())),
+            _ => None,
+        });
+        if let Some(nobody) = refused.collect() {
+            return GroupFailure::NotReady(nobody);
+        }
+        let of_start = |(name, outcome)| match (outcome, self.setpoint) {
+            // It was that of the setpoint, which is given first.
+            (Outcome::Confirmed, Some(setpoint)) => {
+                (name, Outcome::not_started(setpoint, Some(Refused::ShutDown), None))
+            }
+            (outcome, _) => (name, outcome),
+        };
+        GroupFailure::Abandoned(outcomes.into_iter().map(of_start).collect())
+    }
+}
+
 /// Why a group did not start, or did not stay started.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum GroupFailure {
     /// These were not ready. Nobody was started.
     NotReady(Vec<(Arc<str>, Refused)>),
+    /// The runtime of the fleet has ended before it was known: what became of each. **Nobody stops again what may turn** by it.
+    Abandoned(Vec<(Arc<str>, Outcome)>),
     /// All were ready, and these did not start; those that did were stopped again.
     Failed {
         /// The outcomes that are not confirmed. Drives whose turn had not come are not among them: they were never
@@ -108,6 +132,10 @@ impl fmt::Display for GroupFailure {
             Self::NotReady(reasons) => {
                 f.write_str("nobody was started, not ready:")?;
                 reasons.iter().try_for_each(|(name, refused)| write!(f, " {name} ({refused})"))
+            }
+            Self::Abandoned(outcomes) => {
+                f.write_str("the fleet has ended meanwhile, nobody is stopped again:")?;
+                outcomes.iter().try_for_each(|(name, outcome)| write!(f, " {name} ({outcome})"))
             }
             Self::Failed { outcomes, stopped } => {
                 f.write_str("stopped again, because not all started:")?;
@@ -295,12 +323,15 @@ impl Group {
     /// Each drive's outcome says which setpoint its start uses. [`GroupFailure`] names who was not ready, or did not start. Dropping the ticket before its outcome was heard takes the
     /// whole start back: see [`GroupTicket`].
     pub fn start(&self, start: GroupStart) -> GroupTicket<GroupStarted> {
-        let gone = self.members.iter().map(|member| (Arc::clone(member.name()), Refused::ShutDown));
-        let gone = Err(GroupFailure::NotReady(gone.collect()));
         let group = self.in_one_act();
-        GroupTicket::spawn(&self.fleet.inner.runtime, gone, async move |told| {
+        let abandoned = move |outcomes| Err(start.abandoned(outcomes));
+        GroupTicket::spawn(&self.fleet.inner.runtime, self.names(), abandoned, async move |told| {
             group.started(start, &told).await
         })
+    }
+
+    fn names(&self) -> Vec<Arc<str>> {
+        self.members.iter().map(|member| Arc::clone(member.name())).collect()
     }
 
     async fn started(&self, start: GroupStart, told: &Told<GroupStarted>) -> GroupStarted {
@@ -335,13 +366,17 @@ impl Group {
 
     /// Gives every drive of the group a setpoint, on each line one drive after the other as in [`start`](Self::start).
     pub fn set_setpoint(&self, setpoint: impl Into<Setpoint>) -> GroupTicket<Vec<(Arc<str>, Outcome)>> {
-        let gone = Outcome::Refused(Refused::ShutDown);
-        let gone = self.members.iter().map(|member| (Arc::clone(member.name()), gone.clone())).collect();
         let order = Order::Setpoint { setpoint: setpoint.into(), until: Until::InForce };
         let group = self.in_one_act();
-        GroupTicket::spawn(&self.fleet.inner.runtime, gone, async move |_| {
+        GroupTicket::spawn(&self.fleet.inner.runtime, self.names(), identity, async move |told| {
+            let told = &told;
             let commands = group.members.iter().map(|member| async {
-                let outcome = group.on_line(member, async || member.order(order).await).await;
+                let command = async || {
+                    let ticket = member.order(order);
+                    told.give(member.name(), &ticket);
+                    ticket.await
+                };
+                let outcome = group.on_line(member, command).await;
                 (Arc::clone(member.name()), outcome)
             });
             join_all(commands).await
@@ -367,6 +402,7 @@ impl Group {
                 // Its leave ends with any stop: its own time is that of a dialog on a line that has room for nothing more.
                 let expires = Instant::now() + 2 * member.settings().times.lifetime;
                 let ticket = member.order_on(Some(leave), Some(expires), order);
+                told.give(member.name(), &ticket);
                 let outcome = ticket.unheard(false).await;
                 told.hold(ticket);
                 failed.fetch_or(!outcome.lets_a_start_follow(), Ordering::Relaxed);
@@ -450,7 +486,11 @@ async fn reach(member: DriveHandle, setpoint: Option<Setpoint>) -> (Arc<str>, Ou
                 Some(_) => {
                     Outcome::NotConfirmed(Unconfirmed::TimeOver { after, last, because: None, stop: None })
                 }
-                None => Outcome::OutcomeUnknown(Unknown { error: snapshot.error.clone(), last, stop: None }),
+                None => Outcome::OutcomeUnknown(Unknown {
+                    error: snapshot.error.clone(),
+                    last,
+                    ..Unknown::default()
+                }),
             }
         }
     };

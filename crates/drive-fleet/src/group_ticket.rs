@@ -11,7 +11,8 @@ use futures_util::future::join_all;
 use tokio::{runtime::Handle, sync::watch, task::AbortHandle};
 
 use crate::{
-    outcome::Outcome,
+    outcome::{Outcome, Refused},
+    progress::{Hearer, outcome},
     ticket::{StopTicket, Ticket},
 };
 
@@ -133,10 +134,15 @@ struct Progress<T> {
 /// The tickets of the members: dropped with the group's, they withdraw what nobody has heard of.
 type Held = Arc<Mutex<Vec<Ticket>>>;
 
+/// What was given to which member, for whoever hears nothing from the steps any more; `None` once the group's ticket is dropped, for an order
+/// whose ticket nobody has is withdrawn.
+type Given = Arc<Mutex<Option<Vec<(Arc<str>, Hearer)>>>>;
+
 /// Where the steps of a group's command tell what they have done.
 pub(crate) struct Told<T> {
     progress: watch::Sender<Progress<T>>,
     held: Held,
+    given: Given,
 }
 
 impl<T> Told<T> {
@@ -145,7 +151,14 @@ impl<T> Told<T> {
         self.progress.send_modify(|progress| progress.in_force = Some(outcome));
     }
 
-    /// This order is a part of it.
+    /// An order was given to this member as a part of it.
+    pub(crate) fn give(&self, member: &Arc<str>, ticket: &Ticket) {
+        if let Some(given) = &mut *lock(&self.given) {
+            given.extend(ticket.hearer().map(|hearer| (Arc::clone(member), hearer)));
+        }
+    }
+
+    /// This order is a part of it, and has ended.
     pub(crate) fn hold(&self, ticket: Ticket) {
         lock(&self.held).push(ticket);
     }
@@ -164,26 +177,42 @@ impl<T> Told<T> {
 pub struct GroupTicket<T> {
     progress: watch::Receiver<Progress<T>>,
     held: Held,
+    given: Given,
     steps: AbortHandle,
-    /// What is told when the runtime has ended before the steps have.
-    gone: T,
+    members: Vec<Arc<str>>,
+    abandoned: Abandoned<T>,
 }
+
+/// What is told when the runtime has ended before the steps have, by what became of each member.
+type Abandoned<T> = Box<dyn Fn(Vec<(Arc<str>, Outcome)>) -> T + Send + Sync>;
 
 impl<T: Clone + Send + Sync + 'static> GroupTicket<T> {
     /// Begins with these steps.
-    pub(crate) fn spawn<F>(runtime: &Handle, gone: T, steps: impl FnOnce(Arc<Told<T>>) -> F) -> Self
+    pub(crate) fn spawn<F>(
+        runtime: &Handle,
+        members: Vec<Arc<str>>,
+        abandoned: impl Fn(Vec<(Arc<str>, Outcome)>) -> T + Send + Sync + 'static,
+        steps: impl FnOnce(Arc<Told<T>>) -> F,
+    ) -> Self
     where
         F: Future<Output = T> + Send + 'static,
     {
         let (progress, heard) = watch::channel(Progress { in_force: None, finished: None });
-        let held = Held::default();
-        let told = Arc::new(Told { progress, held: Arc::clone(&held) });
+        let (held, given) = (Held::default(), Given::new(Mutex::new(Some(Vec::new()))));
+        let told = Arc::new(Told { progress, held: Arc::clone(&held), given: Arc::clone(&given) });
         let steps = steps(Arc::clone(&told));
         let steps = runtime.spawn(async move {
             let outcome = steps.await;
             told.progress.send_modify(|progress| progress.finished = Some(outcome));
         });
-        Self { progress: heard, held, steps: steps.abort_handle(), gone }
+        Self {
+            progress: heard,
+            held,
+            given,
+            steps: steps.abort_handle(),
+            members,
+            abandoned: Box::new(abandoned),
+        }
     }
 
     /// Waits until it is in force on every drive, or why it is not: a start does not wait for the reference here.
@@ -210,14 +239,39 @@ impl<T: Clone + Send + Sync + 'static> GroupTicket<T> {
     async fn hear(&self, known: impl Fn(&Progress<T>) -> Option<T>) -> T {
         let mut progress = self.progress.clone();
         let told = progress.wait_for(|progress| known(progress).is_some()).await;
-        let outcome = told.ok().and_then(|progress| known(&progress)).unwrap_or_else(|| self.gone.clone());
+        let outcome = match told.ok().and_then(|progress| known(&progress)) {
+            Some(outcome) => outcome,
+            None => (self.abandoned)(self.became_of_each().await),
+        };
         lock(&self.held).iter().for_each(Ticket::keep);
         outcome
     }
 }
 
+impl<T> GroupTicket<T> {
+    /// What became of each member by what it was given last. Who was given nothing was not commanded.
+    async fn became_of_each(&self) -> Vec<(Arc<str>, Outcome)> {
+        let is_sent = |outcome: &Outcome| !matches!(outcome, Outcome::Refused(_));
+        let given = lock(&self.given).clone().unwrap_or_default();
+        let mut each: Vec<_> = self
+            .members
+            .iter()
+            .map(|member| (Arc::clone(member), Outcome::Refused(Refused::ShutDown)))
+            .collect();
+        for (member, hearer) in given {
+            let became = outcome(&hearer, false).await;
+            let of_member = each.iter_mut().find(|(name, _)| *name == member);
+            if let Some((_, known)) = of_member.filter(|(_, known)| is_sent(&became) || !is_sent(known)) {
+                *known = became;
+            }
+        }
+        each
+    }
+}
+
 impl<T> Drop for GroupTicket<T> {
     fn drop(&mut self) {
+        *lock(&self.given) = None;
         self.steps.abort();
         lock(&self.held).clear();
     }
@@ -238,6 +292,6 @@ impl<T> fmt::Debug for GroupTicket<T> {
     }
 }
 
-fn lock(held: &Held) -> MutexGuard<'_, Vec<Ticket>> {
-    held.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock<T>(kept: &Mutex<T>) -> MutexGuard<'_, T> {
+    kept.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -415,7 +415,7 @@ impl DriveHandle {
         let (reply, told) = oneshot::channel();
         let (id, name) = (self.entry.new_call(), Arc::clone(&self.act.commander));
         self.post(Message::Question { id, question, name, reply })?;
-        told.await.unwrap_or(Err(Refused::ShutDown))
+        told.await.unwrap_or_else(|_| Err(question.abandoned(self.entry.slave)))
     }
 
     fn post(&self, message: Message) -> Result<(), Refused> {

@@ -48,6 +48,7 @@ pub mod alarms;
 mod builder;
 mod cause;
 mod concern;
+mod driver;
 mod eeprom;
 mod event;
 mod exceeded;

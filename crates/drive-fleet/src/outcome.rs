@@ -116,13 +116,14 @@ pub enum Outcome {
     Started(Started),
     /// The drive's own words show it of a stop: how it was asked for, and how the drive has stopped.
     Stopped(StopModes),
-    /// It was sent and the drive's own words do not show it. A run command may still take effect later, so that a start
-    /// is taken back by a ramp stop, which is repeated until it is confirmed.
+    /// It was sent, or a part of it, and the drive's own words do not show it. A run command may still take effect later, so that a
+    /// start is taken back by a ramp stop, which is repeated until it is confirmed; not one whose run word was not sent
+    /// ([`Unconfirmed::NotStarted`]).
     NotConfirmed(Unconfirmed),
     /// Its lifetime ran out before it was sent. It never will be.
     Expired,
     /// It was sent, or may have been, and the drive could not be asked in time what became of it. A start is taken back
-    /// as above.
+    /// as above, unless whoever would do that has ended ([`Unknown::abandoned`]).
     OutcomeUnknown(Unknown),
     /// It was refused; nothing moved because of it.
     Refused(Refused),
@@ -133,6 +134,15 @@ impl Outcome {
     #[must_use]
     pub const fn is_confirmed(&self) -> bool {
         matches!(self, Self::Confirmed | Self::Started(_) | Self::Stopped(_))
+    }
+
+    /// Of a start whose setpoint is in the drive and whose run word was not sent: why, where it was not its time that was over.
+    pub(crate) const fn not_started(
+        setpoint: Setpoint,
+        why: Option<Refused>,
+        last: Option<LastSeen>,
+    ) -> Self {
+        Self::NotConfirmed(Unconfirmed::NotStarted { setpoint, why, last })
     }
 
     /// Whether a start may follow: it is confirmed, or a setpoint that only a start shows.
@@ -361,7 +371,7 @@ impl fmt::Display for Tenths {
 }
 
 /// What is known of a command whose outcome is not.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Unknown {
     /// The last error; `None` while its driver still looks for a sign of it.
     pub error: Option<Error>,
@@ -369,10 +379,16 @@ pub struct Unknown {
     pub last: Option<LastSeen>,
     /// Of a stop: how it was asked for, and how the drive stops.
     pub stop: Option<StopModes>,
+    /// Whoever carried it out has ended first: the runtime of the fleet, or the fleet with its last handle. **Nobody takes a start back
+    /// or repeats a stop then.**
+    pub abandoned: bool,
 }
 
 impl fmt::Display for Unknown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.abandoned {
+            return f.write_str("the fleet has ended meanwhile: it was sent, or may have been, and nobody looks after it any more");
+        }
         match &self.error {
             Some(error) => error.fmt(f)?,
             // It may have answered all the while that its driver looks for a sign of it.
@@ -417,6 +433,15 @@ pub enum Unconfirmed {
         /// How it was asked for, and how the drive stops.
         stop: StopModes,
     },
+    /// Of a start: its setpoint is in the drive, and a motor that runs already goes to it; its run word was not sent, and never will be.
+    NotStarted {
+        /// The setpoint.
+        setpoint: Setpoint,
+        /// Why its run word was not sent; `None`: its lifetime was over.
+        why: Option<Refused>,
+        /// What the drive said last, which may be older than the setpoint.
+        last: Option<LastSeen>,
+    },
     /// A later command took its place.
     Superseded,
     /// A stop came.
@@ -438,6 +463,7 @@ impl Unconfirmed {
             | Self::Denied(Error::NotConfirmed { because: Some(because), .. }) => because.word(),
             Self::TimeOver { .. } => "time_over",
             Self::Denied(_) | Self::StopDenied { .. } => "denied",
+            Self::NotStarted { .. } => "not_started",
             Self::Superseded => "later_command",
             Self::Stopped => "stop",
             Self::Withdrawn => "withdrawn",
@@ -467,6 +493,14 @@ impl fmt::Display for Unconfirmed {
             Self::StopDenied { error, stop } => {
                 error.fmt(f)?;
                 replaced(f, Some(*stop))
+            }
+            Self::NotStarted { setpoint, why, last } => {
+                write!(f, "its setpoint of {setpoint} is in the drive, and its run word was not sent: ")?;
+                match why {
+                    Some(why) => why.fmt(f)?,
+                    None => f.write_str("its time was over")?,
+                }
+                last.as_ref().map_or(Ok(()), |last| write!(f, "; the drive was last seen {last}"))
             }
             Self::Superseded => f.write_str("a later command took its place"),
             Self::Stopped => f.write_str("a stop came"),

@@ -2,14 +2,27 @@
 
 use tokio::sync::watch;
 
-use crate::outcome::{Outcome, Refused};
+use crate::outcome::{Outcome, Refused, Unknown};
 
 /// How far a command has come.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Progress {
+    /// It was sent to the drive, or may have been.
+    pub(crate) begun: bool,
     /// The drive has shown that it is in force, and how.
     pub(crate) in_force: Option<Outcome>,
     pub(crate) finished: Option<Outcome>,
+}
+
+impl Progress {
+    /// What is told of it when whoever carried it out has ended first, with its runtime or with the last handle of its fleet.
+    fn abandoned(&self) -> Outcome {
+        if self.begun {
+            Outcome::OutcomeUnknown(Unknown { abandoned: true, ..Unknown::default() })
+        } else {
+            Outcome::Refused(Refused::ShutDown)
+        }
+    }
 }
 
 /// Where the progress of a command is told.
@@ -20,7 +33,8 @@ pub(crate) type Hearer = watch::Receiver<Progress>;
 
 /// A command that has ended before it began.
 pub(crate) fn refused(refused: Refused) -> Hearer {
-    watch::Sender::new(Progress { in_force: None, finished: Some(Outcome::Refused(refused)) }).subscribe()
+    watch::Sender::new(Progress { finished: Some(Outcome::Refused(refused)), ..Progress::default() })
+        .subscribe()
 }
 
 /// What became of a command, when it is known; with `early` also that it is in force.
@@ -30,6 +44,8 @@ pub(crate) async fn outcome(hearer: &Hearer, early: bool) -> Outcome {
         in_force.or_else(|| progress.finished.clone())
     };
     let mut hearer = hearer.clone();
-    let told = hearer.wait_for(|progress| known(progress).is_some()).await;
-    told.ok().and_then(|progress| known(&progress)).unwrap_or(Outcome::Refused(Refused::ShutDown))
+    // Its end wakes as well, and leaves what was told last.
+    let _ = hearer.wait_for(|progress| known(progress).is_some()).await;
+    let told = hearer.borrow();
+    known(&told).unwrap_or_else(|| told.abandoned())
 }

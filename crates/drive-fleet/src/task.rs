@@ -2,32 +2,37 @@
 
 use std::{
     collections::BTreeMap,
+    panic::AssertUnwindSafe,
     pin::{Pin, pin},
     sync::Arc,
     time::Duration,
 };
 
 use drive_bus::Slave;
-use drive_core::{Direction, Drive, Error, Lease, Lifetimes, Setpoint};
-use futures_util::future::poll_immediate;
+use drive_core::{Drive, Lease};
+use futures_util::{FutureExt, future::poll_immediate};
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
-    time::{Instant, sleep_until},
+    time::{Instant, sleep, sleep_until},
 };
 
 use crate::{
     cause::Act,
+    driver::{Driver, said},
     event::{ExitAction, Moment, Teller},
     message::{Message, Urgent},
     outcome::Refused,
     place::Place,
-    progress::Report,
+    progress::{Progress, Report},
     round::Round,
     runs::Keeper,
-    settings::{DriveSettings, Left, RunRecord},
+    settings::{DriveSettings, Left},
     snapshot::Snapshot,
-    supervisor::{Asker, CallId, Job, Output, Question, Reply, Step, Supervisor, Told, Turn},
+    supervisor::{Asker, CallId, Job, Output, Step, Supervisor, Told, Turn},
 };
+
+/// Until a drive is gone on with whose task has panicked beside a call: a call has its own pause.
+const AFTER_PANIC: Duration = Duration::from_millis(10);
 
 /// The task of one drive.
 pub(crate) struct Task {
@@ -43,30 +48,67 @@ pub(crate) struct Task {
 }
 
 impl Task {
-    /// Runs until the fleet has shut down, or nobody holds it any more.
+    /// Runs until the fleet has shut down, or nobody holds it any more. **No panic ends it**: a motor whose driver has a fault is to be
+    /// stopped all the same.
     pub(crate) async fn run(self) {
-        let Self { mut drive, mut desk, mut messages, mut urgent, turns, mut keeper, answers } = self;
-        let mut open = true;
-        let mut losses = answers.port_losses();
-        let mut retractions = answers.retractions();
+        let Self { drive, desk, messages, urgent, turns, keeper, answers } = self;
+        let (losses, retractions) = (answers.port_losses(), answers.retractions());
+        let mut talk = Talk {
+            driver: Driver::new(drive),
+            desk,
+            messages,
+            open: true,
+            urgent,
+            turns,
+            keeper,
+            answers,
+            losses,
+            retractions,
+        };
+        while let Err(panic) = AssertUnwindSafe(talk.go_on()).catch_unwind().await {
+            let in_a_call = talk.desk.supervisor.handle_panicked(Instant::now(), said(&*panic));
+            if !in_a_call {
+                sleep(AFTER_PANIC).await;
+            }
+        }
+    }
+}
+
+/// The conversation of a task with its drive.
+struct Talk {
+    driver: Driver,
+    desk: Desk,
+    messages: mpsc::Receiver<Message>,
+    /// Somebody may still send some.
+    open: bool,
+    urgent: mpsc::UnboundedReceiver<Urgent>,
+    turns: Arc<Semaphore>,
+    keeper: Keeper,
+    answers: Slave,
+    losses: watch::Receiver<u64>,
+    retractions: watch::Receiver<u64>,
+}
+
+impl Talk {
+    /// Until it is over.
+    async fn go_on(&mut self) {
+        let Self { driver, desk, messages, open, urgent, turns, keeper, answers, losses, retractions } = self;
         // Kept across the steps, so that a drive does not lose its place in the row.
         let mut waits_for_turn = None;
         let mut turn: Option<OwnedSemaphorePermit> = None;
         loop {
             if let Some(settings) = desk.settings.take() {
-                let accepted: Vec<&str> = settings.accept_self_restart.iter().map(String::as_str).collect();
-                drive.accept_self_restart(&accepted);
-                drive.set_coast_time(settings.coast);
+                driver.configure(&settings);
                 keeper.follow_name(desk.supervisor.name());
             }
-            drive.set_injection_time(desk.supervisor.injection());
+            driver.set_injection_time(desk.supervisor.injection());
             if let Some(lease) = desk.supervisor.take_adoption() {
-                drive.adopt(lease);
+                driver.adopt(lease);
             }
             // Also what a call that was dropped has left.
-            let lease = drive.lease();
+            let lease = driver.lease();
             desk.supervisor.handle_lease(lease);
-            desk.supervisor.handle_unmet(drive.unmet());
+            desk.supervisor.handle_unmet(driver.unmet());
             // The record of an earlier run stays kept until the drive has said whether it is ours.
             let stop = desk.supervisor.stop_under_way();
             if lease.is_some() || !desk.supervisor.is_adopting() {
@@ -78,7 +120,7 @@ impl Task {
                 losses.mark_unchanged();
                 desk.supervisor.handle_line_lost(Instant::now());
             }
-            if let Some(ground) = drive.take_changed() {
+            if let Some(ground) = driver.take_changed() {
                 desk.supervisor.handle_changed(Instant::now(), ground);
             }
             retractions.mark_unchanged();
@@ -88,9 +130,12 @@ impl Task {
             if let Some(at) = answers.answered_at() {
                 desk.supervisor.handle_heard(at);
             }
+            if let Some(said) = driver.take_panic() {
+                desk.supervisor.note_panic(said);
+            }
             let step = desk.supervisor.next(Instant::now());
             if let Step::Do { job: Job::Start(direction), .. } = step
-                && let Some(word) = drive.run_word_for(direction)
+                && let Some(word) = driver.run_word_for(direction)
             {
                 // It may turn the motor long before its driver has seen that it does: it is ours from now on.
                 desk.supervisor.handle_lease(Some(Lease::new(direction, word)));
@@ -102,8 +147,9 @@ impl Task {
                 }
                 Step::Wait(until) => (None, Some(until)),
                 Step::Do { job, lifetime, until, .. } => {
+                    desk.begin_order();
                     let identity = desk.supervisor.says_what_it_is();
-                    (Some(carry_out(&mut *drive, &mut keeper, job, lifetime, identity)), until)
+                    (Some(driver.carry_out(keeper, job, lifetime, identity)), until)
                 }
             };
             let on_turn = matches!(step, Step::Do { on_turn: true, .. });
@@ -113,7 +159,7 @@ impl Task {
                     drop(turn.take());
                 }
                 Turn::Wanted if waits_for_turn.is_none() => {
-                    waits_for_turn = Some(Box::pin(Arc::clone(&turns).acquire_owned()));
+                    waits_for_turn = Some(Box::pin(Arc::clone(turns).acquire_owned()));
                 }
                 _ => {}
             }
@@ -145,17 +191,17 @@ impl Task {
                         Some(message) => desk.handle_urgent(message),
                         None => return,
                     },
-                    message = messages.recv(), if open => match message {
+                    message = messages.recv(), if *open => match message {
                         Some(message) => desk.handle_message(message),
                         None => {
-                            open = false;
+                            *open = false;
                             continue;
                         }
                     },
                     // What is left of a call would be sent to whoever answers now.
-                    () = changed(&mut losses) => desk.supervisor.handle_line_lost(Instant::now()),
+                    () = changed(losses) => desk.supervisor.handle_line_lost(Instant::now()),
                     // However long the call under way takes, what is withdrawn is good for nobody any more.
-                    () = changed(&mut retractions) => match answers.retracted() {
+                    () = changed(retractions) => match answers.retracted() {
                         Some(at) => desk.supervisor.handle_retracted(Instant::now(), at),
                         None => continue,
                     },
@@ -300,6 +346,8 @@ impl Desk {
                 let callers = &self.callers;
                 self.supervisor.forget_callers(|id| !callers.contains_key(&id));
                 let asker = self.caller(id, act, reply);
+                // It is sent at once, or is taken in by one that was.
+                self.begin(id);
                 self.supervisor.handle_stop(now, asker, order, patience)
             }
             Urgent::Withdraw(id) => self.supervisor.handle_withdrawal(now, id),
@@ -325,6 +373,22 @@ impl Desk {
                 true
             }
         }
+    }
+
+    /// Of the order that is sent now nobody is told any more that it was not, whatever becomes of this task.
+    fn begin_order(&self) {
+        if let Some(id) = self.supervisor.asker_of_sent() {
+            self.begin(id);
+        }
+    }
+
+    fn begin(&self, id: CallId) {
+        let begin = |progress: &mut Progress| {
+            progress.begun = true;
+            // There is nothing to be heard.
+            false
+        };
+        self.callers.get(&id).map(|caller| caller.send_if_modified(begin));
     }
 
     fn caller(&mut self, id: CallId, act: Arc<Act>, reply: Report) -> Asker {
@@ -378,127 +442,5 @@ impl Desk {
         if let Some(action) = self.supervisor.exit_action() {
             self.exit.send_replace(Some((action.clone(), self.supervisor.left())));
         }
-    }
-}
-
-/// What a call gave, and the run command of this side as it stands behind it.
-async fn carry_out(
-    drive: &mut dyn Drive,
-    keeper: &mut Keeper,
-    job: Job,
-    lifetime: Option<Duration>,
-    identity: Option<String>,
-) -> (Reply, Option<Lease>) {
-    let mut lifetime = lifetime;
-    if let Job::Start(direction) = job
-        && let Some(word) = drive.run_word_for(direction)
-    {
-        let began = Instant::now();
-        let run = RunRecord::of(|| identity, Some(Lease::new(direction, word)), None);
-        keeper.before(run).await;
-        // The disk's time is the order's: a start is not sent late for it (rule 2).
-        lifetime = lifetime.map(|lifetime| lifetime.saturating_sub(began.elapsed()));
-    }
-    let reply = call(drive, job, lifetime).await;
-    (reply, drive.lease())
-}
-
-/// How long what a job asks may wait until it is sent. The time of an order is that order's alone: what looks at a stop is in
-/// the class of commands, too, and waits for as long as it takes.
-fn lifetimes(job: Job, lifetime: Option<Duration>) -> Lifetimes {
-    let usual = Lifetimes::default();
-    match job {
-        Job::Status { .. } => Lifetimes { status: lifetime, ..usual },
-        Job::SetSetpoint(..) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
-            Lifetimes { command: lifetime, ..usual }
-        }
-        Job::Stop(_) | Job::Withdraw => Lifetimes { command: None, ..usual },
-        _ => usual,
-    }
-}
-
-/// A call that goes on where it was cut, if it is such a one.
-async fn call(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Reply {
-    if let Some(kept) = drive.kept_mut() {
-        match (job.keeps(), job) {
-            (Some(number), _) => kept.begin(number),
-            (None, Job::Status { anew: true }) => kept.forget(),
-            (None, _) => kept.pause(),
-        }
-    }
-    let reply = asked(drive, job, lifetime).await;
-    // What found no answer goes on as well.
-    let ended = reply.error().is_none_or(|error| !matches!(error, Error::Port { .. }));
-    if let (Some(kept), Some(number), true) = (drive.kept_mut(), job.keeps(), ended) {
-        kept.end(number);
-    }
-    reply
-}
-
-/// A motor that runs by somebody else's command is not given the setpoint of a start that it will refuse.
-async fn given(drive: &mut dyn Drive, setpoint: Setpoint, start: Option<Direction>) -> Result<(), Error> {
-    if let Some(direction) = start {
-        drive.may_start(direction, Some(setpoint)).await?;
-    }
-    drive.set_setpoint(setpoint).await
-}
-
-async fn asked(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Reply {
-    *drive.lifetimes_mut() = lifetimes(job, lifetime);
-    match job {
-        Job::Stop(mode) => Reply::stopped(drive.slave(), mode, drive.stop(mode).await),
-        Job::Withdraw => Reply::Withdrawn(drive.withdraw().await),
-        Job::Start(direction) => Reply::started(drive.slave(), direction, drive.start(direction).await),
-        Job::SetSetpoint(setpoint, start) => Reply::Setpoint(given(drive, setpoint, start).await),
-        Job::ResetFaults => Reply::Ordered(drive.reset_faults().await),
-        Job::Release => Reply::Ordered(drive.release().await),
-        Job::Persist => Reply::Saved(drive.persist().await),
-        Job::ArmWatchdog(timeout, reaction) => Reply::Watchdog(drive.arm_watchdog(timeout, reaction).await),
-        Job::RestoreWatchdog(found) => Reply::Watchdog(drive.restore_watchdog(found).await),
-        Job::KeepAlive => Reply::KeptAlive(drive.keep_alive().await),
-        Job::Status { anew } => {
-            if anew {
-                drive.forget();
-            }
-            Reply::Status(drive.status().await)
-        }
-        Job::Identify => {
-            let identity = drive.identify().await;
-            Reply::Identity(identity.map(|identity| {
-                let recognised = drive.recognise(&identity);
-                (identity, recognised)
-            }))
-        }
-        Job::Watchdog => Reply::Watchdog(drive.watchdog().await),
-        Job::SelfRestarts => Reply::SelfRestarts(drive.self_restarts().await),
-        Job::Faults => Reply::Faults(drive.faults().await),
-        Job::Measurements => Reply::Measurements(drive.measurements().await),
-        Job::Ask(Question::Faults) => Reply::Told(drive.faults().await.map(Told::Faults)),
-        Job::Ask(Question::Read(row)) => Reply::Told(drive.read_parameter(row).await.map(Told::Word)),
-        Job::Ask(Question::Write(row, word)) => {
-            Reply::Told(drive.write_parameter(row, word).await.map(Told::Written))
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use drive_core::{Direction, Frequency, StopMode};
-
-    use super::*;
-
-    #[test]
-    fn the_look_at_a_stop_has_all_the_time_whatever_was_left_to_the_order_before() {
-        let (short, usual) = (Some(Duration::from_millis(54)), Lifetimes::default());
-        let setpoint = Frequency::from_hertz(20).into();
-        let orders = [Job::SetSetpoint(setpoint, None), Job::ResetFaults, Job::Release, Job::Persist];
-        for order in [Job::Start(Direction::Forward)].into_iter().chain(orders) {
-            assert_eq!(lifetimes(order, short), Lifetimes { command: short, ..usual }, "{order:?}");
-        }
-        for stop in [Job::Stop(StopMode::Ramp), Job::Withdraw] {
-            assert_eq!(lifetimes(stop, short), Lifetimes { command: None, ..usual }, "{stop:?}");
-        }
-        assert_eq!(lifetimes(Job::Status { anew: false }, short), Lifetimes { status: short, ..usual });
-        assert_eq!(lifetimes(Job::KeepAlive, short), usual);
     }
 }

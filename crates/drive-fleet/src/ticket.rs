@@ -115,6 +115,11 @@ impl Ticket {
         }
     }
 
+    /// Where it is heard how far it has come. Whoever holds that takes the withdrawal from an order that is not taken on yet.
+    pub(crate) fn hearer(&self) -> Option<Hearer> {
+        self.hearer.clone()
+    }
+
     /// Dropping it does nothing from now on.
     pub(crate) fn keep(&self) {
         self.heard.store(true, Ordering::Relaxed);

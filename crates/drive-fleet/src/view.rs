@@ -428,6 +428,11 @@ pub enum Happened {
         /// What.
         ground: Ground,
     },
+    /// Its driver has panicked in a call.
+    DriverPanicked {
+        /// What it said of that.
+        said: String,
+    },
     /// Another answer came to the question that the last status has answered.
     ValueWithdrawn,
     /// The line has found something wrong, or does not find it any more.
@@ -534,6 +539,7 @@ impl From<&EventKind> for Happened {
             EventKind::EepromWritten { by, ledger } => {
                 Self::EepromWritten { by: *by, ledger: EepromLedger::clone(ledger) }
             }
+            EventKind::DriverPanicked(said) => Self::DriverPanicked { said: said.clone() },
             EventKind::ValueWithdrawn => Self::ValueWithdrawn,
             EventKind::LineFinding { finding, present } => Self::LineFinding {
                 defect: finding.defect.name().to_owned(),
@@ -604,7 +610,9 @@ impl From<&Outcome> for OutcomeView {
         let (error, last) = match outcome {
             Outcome::NotConfirmed(Unconfirmed::Denied(error) | Unconfirmed::StopDenied { error, .. })
             | Outcome::Refused(Refused::Drive(error)) => (Some(error), None),
-            Outcome::NotConfirmed(Unconfirmed::TimeOver { last, .. }) => (None, last.as_ref()),
+            Outcome::NotConfirmed(
+                Unconfirmed::TimeOver { last, .. } | Unconfirmed::NotStarted { last, .. },
+            ) => (None, last.as_ref()),
             Outcome::OutcomeUnknown(unknown) => (unknown.error.as_ref(), unknown.last.as_ref()),
             _ => (None, None),
         };

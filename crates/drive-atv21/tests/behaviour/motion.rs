@@ -276,6 +276,29 @@ async fn a_motor_that_still_turns_does_not_confirm_a_start_that_was_lost() {
     assert_eq!(error.kind(), ErrorKind::NotConfirmed, "{error}");
 }
 
+/// [`ErrorKind::NotSent`]: "Nothing was sent". A motor that follows the reference in rpm comes down by the zero that is written first.
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_or_a_release_of_which_a_part_was_written_is_never_told_as_not_sent() {
+    // The first so many writes are answered, and the next is not sent in time.
+    let answers = |writes| {
+        let mut words = Words::new(&CAPABILITIES, &[(0x0012, 5_000), (0xFA13, 600)]);
+        words.writes.extend(std::iter::repeat_n(None, writes).chain([Some((PortError::Expired, false))]));
+        Atv21::new(words, bench::address(1))
+    };
+    let mut drive = answers(1);
+    let error = drive.set_setpoint(HALF_SPEED.into()).await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
+    assert_eq!(drive.into_port().written(), [(0xFA13, 0), (0xFA01, 2_500)]);
+    for of_release in 0..3 {
+        let mut drive = answers(2 + of_release);
+        drive.set_setpoint(HALF_SPEED.into()).await.unwrap();
+        let error = drive.release().await.unwrap_err();
+        let expected = if of_release == 0 { ErrorKind::NotSent } else { ErrorKind::OutcomeUnknown };
+        assert_eq!(error.kind(), expected, "behind {of_release}: {error}");
+        assert_eq!(drive.into_port().written().len(), 2 + of_release + 1);
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_broadcast_stop_reaches_the_drive() {
     let (rig, mut drive) = Rig::factory();

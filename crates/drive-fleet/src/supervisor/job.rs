@@ -116,7 +116,26 @@ pub(crate) enum Reply {
 }
 
 impl Reply {
-    /// The error, if it is one that tells of the line or the drive, and not of what the family has.
+    /// What a job gives that has failed by this.
+    pub(crate) fn failed(job: Job, error: Error) -> Self {
+        match job {
+            Job::Stop(_) => Self::Stopped(Err(error)),
+            Job::Withdraw => Self::Withdrawn(Err(error)),
+            Job::Start(_) | Job::ResetFaults | Job::Release => Self::Ordered(Err(error)),
+            Job::SetSetpoint(..) => Self::Setpoint(Err(error)),
+            Job::Persist => Self::Saved(Err(error)),
+            Job::ArmWatchdog(..) | Job::RestoreWatchdog(_) | Job::Watchdog => Self::Watchdog(Err(error)),
+            Job::KeepAlive => Self::KeptAlive(Err(error)),
+            Job::Status { .. } => Self::Status(Err(error)),
+            Job::Identify => Self::Identity(Err(error)),
+            Job::SelfRestarts => Self::SelfRestarts(Err(error)),
+            Job::Faults => Self::Faults(Err(error)),
+            Job::Measurements => Self::Measurements(Err(error)),
+            Job::Ask(_) => Self::Told(Err(error)),
+        }
+    }
+
+    /// The error, if it is one that tells of the line, the drive or its driver, and not of what the family has.
     pub(crate) fn error(&self) -> Option<&Error> {
         let error = match self {
             Self::Stopped(result) => result.as_ref().err(),
@@ -132,7 +151,13 @@ impl Reply {
             Self::Told(told) => told.as_ref().err(),
         };
         error.filter(|error| {
-            matches!(error, Error::Port { .. } | Error::Exception { .. } | Error::Answer { .. })
+            matches!(
+                error,
+                Error::Port { .. }
+                    | Error::Exception { .. }
+                    | Error::Answer { .. }
+                    | Error::DriverPanicked(_)
+            )
         })
     }
 

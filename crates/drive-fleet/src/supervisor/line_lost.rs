@@ -59,7 +59,7 @@ impl Supervisor {
             active.phase,
             Phase::Sending(Job::Start(_)) | Phase::Verifying { job: Job::Start(_), .. }
         );
-        if matches!(active, Active { phase: Phase::Prepare, setpoint_given: false, .. }) {
+        if matches!(active, Active { phase: Phase::Prepare, setpoint_given: None, .. }) {
             return;
         }
         let outcome = match active.phase {

@@ -62,6 +62,9 @@ use crate::{
     snapshot::{Counters, Link, OffSetpoint, Snapshot, Timed, Trip},
 };
 
+/// How many panics of a driver are told that say something else, until its drive is found anew.
+const PANICS: usize = 8;
+
 /// What was written last that changes the motor, and why.
 #[derive(Debug)]
 struct Acted {
@@ -190,6 +193,8 @@ pub(crate) struct Supervisor {
     silent_since: Instant,
     /// The last error since the last status.
     last_error: Option<Error>,
+    /// What was told of panics of its driver since it was found.
+    panics: Vec<String>,
     /// A status has failed since the last that came: the drive may have been switched off and on.
     doubtful: bool,
     /// Its line has lost its port, and no status was read anew since: another drive may answer.
@@ -252,6 +257,7 @@ impl Supervisor {
             counters: Counters::default(),
             silent_since: now,
             last_error: None,
+            panics: Vec::new(),
             doubtful: false,
             unseen: false,
             in_flight: None,
@@ -506,6 +512,24 @@ impl Supervisor {
         self.note_eeprom(now, worn);
     }
 
+    /// Its task has panicked: the job in flight has failed by it. Gives whether there is one.
+    pub(crate) fn handle_panicked(&mut self, now: Instant, said: String) -> bool {
+        self.note_panic(said.clone());
+        let Some(job) = self.in_flight else { return false };
+        self.handle_reply(now, Reply::failed(job, Error::DriverPanicked(said)));
+        true
+    }
+
+    /// Its driver has panicked, and goes on being asked.
+    pub(crate) fn note_panic(&mut self, said: String) {
+        // What it has half read counts for nothing.
+        self.doubtful = true;
+        if self.panics.len() < PANICS && !self.panics.contains(&said) {
+            self.panics.push(said.clone());
+            self.emit_by(EventKind::DriverPanicked(said), Cause::Found);
+        }
+    }
+
     /// The drive has heard a frame, and answered it. No reply of a job tells that: some take no exchange at all.
     pub(crate) fn handle_heard(&mut self, at: Instant) {
         self.checks.heard(at);
@@ -693,7 +717,7 @@ impl Supervisor {
     /// What is known of something whose outcome is not.
     fn unknown(&self, now: Instant, error: Option<Error>) -> Outcome {
         let last = self.status.as_ref().map(|status| status.seen(now));
-        Outcome::OutcomeUnknown(Unknown { error, last, stop: None })
+        Outcome::OutcomeUnknown(Unknown { error, last, ..Unknown::default() })
     }
 }
 

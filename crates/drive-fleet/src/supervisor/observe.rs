@@ -90,6 +90,7 @@ impl Supervisor {
         self.changed = true;
         if was != Link::Connected {
             self.link = Link::Connected;
+            self.panics.clear();
             self.given = None;
             self.checks.connected(now);
             self.pace.reconnected(now);

@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use drive_core::{Direction, Error, StopMode};
+use drive_core::{Direction, Error, Setpoint, StopMode};
 use tokio::time::Instant;
 
 use super::{Asker, CallId, Job, Leave, Supervisor, permission::Blocked};
@@ -31,8 +31,8 @@ pub(super) struct Active {
     pub(super) before: Option<Direction>,
     /// When its lifetime is over.
     expires: Instant,
-    /// The setpoint of a start has been given.
-    pub(super) setpoint_given: bool,
+    /// The setpoint of a start, once it has been given.
+    pub(super) setpoint_given: Option<Setpoint>,
     /// The watchdog was written on its behalf.
     pub(super) armed: bool,
     /// Why it could not be sent yet.
@@ -69,7 +69,7 @@ impl Active {
     /// How it ends when something comes in between.
     pub(super) fn ended_by(&self, unsent: Refused, sent: Unconfirmed) -> Outcome {
         match &self.phase {
-            Phase::Prepare if !self.setpoint_given => Outcome::Refused(unsent),
+            Phase::Prepare if self.setpoint_given.is_none() => Outcome::Refused(unsent),
             _ => Outcome::NotConfirmed(sent),
         }
     }
@@ -197,6 +197,12 @@ impl Supervisor {
         })
     }
 
+    /// Who waits for the order of which something is sent now, or may be.
+    pub(crate) fn asker_of_sent(&self) -> Option<CallId> {
+        let sends = |active: &&Active| matches!(active.phase, Phase::Sending(_));
+        self.active.as_ref().filter(sends).and_then(|active| active.asker.id())
+    }
+
     /// How long the calls of the order in flight may wait.
     pub(super) fn order_lifetime(&self, now: Instant) -> Duration {
         let expires = self.active.as_ref().map_or(now, |active| active.expires);
@@ -220,7 +226,7 @@ impl Supervisor {
                     order,
                     before,
                     expires,
-                    setpoint_given: false,
+                    setpoint_given: None,
                     armed: false,
                     blocked: None,
                     phase: Phase::Prepare,
@@ -239,7 +245,7 @@ impl Supervisor {
                 let waited = active.blocked.is_some();
                 // What it has waited for may have come just now, and then something else is in the way, or nothing.
                 let blocked = self.allow(now, order, self.active.as_ref()).err().filter(|_| waited);
-                self.end_order(blocked.map_or(Outcome::Expired, |by| Outcome::Refused(by.reason())));
+                self.end_unsent(now, blocked.map_or(Outcome::Expired, |by| Outcome::Refused(by.reason())));
                 continue;
             }
             match self.allow(now, order, self.active.as_ref()) {
@@ -258,7 +264,7 @@ impl Supervisor {
                     }
                     self.end_order(Outcome::Confirmed);
                 }
-                Err(Blocked::For(refused)) => self.end_order(Outcome::Refused(refused)),
+                Err(Blocked::For(refused)) => self.end_unsent(now, Outcome::Refused(refused)),
                 Err(Blocked::Until(job, refused)) => {
                     self.block(refused, matches!(job, Job::ArmWatchdog(..)));
                     return Some((job, Some(expires)));

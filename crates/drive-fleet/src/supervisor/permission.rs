@@ -154,7 +154,7 @@ impl Supervisor {
                     asked => asked,
                 };
                 match setpoint {
-                    Some(setpoint) if active.is_none_or(|active| !active.setpoint_given) => {
+                    Some(setpoint) if active.is_none_or(|active| active.setpoint_given.is_none()) => {
                         self.allow_setpoint(now, setpoint)?;
                         Some(Job::SetSetpoint(setpoint, (!self.was_just_at_rest(now)).then_some(direction)))
                     }

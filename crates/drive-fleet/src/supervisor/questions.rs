@@ -4,7 +4,7 @@ use std::{collections::VecDeque, mem};
 
 use super::{CallId, Job, Output, Supervisor, permission::QUEUE};
 use crate::{cause::Act, outcome::Refused, snapshot::Link};
-use drive_core::{Faults, Result, Row, Written};
+use drive_core::{Error, Exchange, Faults, PortError, Result, Row, SlaveAddress, Written};
 
 /// What is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +15,16 @@ pub(crate) enum Question {
     Read(&'static Row),
     /// Write a word to a row, unless it holds it.
     Write(&'static Row, u16),
+}
+
+impl Question {
+    /// What is told of it when whoever carried it out has ended without a word: a write may have been sent.
+    pub(crate) fn abandoned(&self, slave: SlaveAddress) -> Refused {
+        let Self::Write(row, _) = self else { return Refused::ShutDown };
+        let exchange = Exchange { function: 6, register: Some(row.address) };
+        let problem = PortError::OutcomeUnknown("the fleet has ended meanwhile");
+        Refused::Drive(Error::Port { slave, exchange, problem })
+    }
 }
 
 /// What came of it.

@@ -495,7 +495,7 @@ impl Supervisor {
             }
             _ => {
                 let last = self.status.as_ref().map(|status| status.seen(now));
-                Outcome::OutcomeUnknown(Unknown { error, last, stop })
+                Outcome::OutcomeUnknown(Unknown { error, last, stop, abandoned: false })
             }
         }
     }

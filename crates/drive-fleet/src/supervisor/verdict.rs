@@ -61,7 +61,7 @@ impl Supervisor {
     fn setpoint_given(&mut self, now: Instant, setpoint: Setpoint) {
         self.given = Some(Given { setpoint, at: now });
         let Some(active) = &mut self.active else { return };
-        active.setpoint_given = true;
+        active.setpoint_given = Some(setpoint);
         match active.order {
             Order::Setpoint { until: Until::InForce, .. } => self.end_order(Outcome::Confirmed),
             Order::Setpoint { .. } => self.await_reference(now, Outcome::Confirmed),
@@ -86,6 +86,21 @@ impl Supervisor {
         }
     }
 
+    /// Ends the order under way so of which nothing was sent, or of a start no run word. **What was written of it is told**: a motor that
+    /// does not stand goes to the setpoint of a start that is refused.
+    pub(super) fn end_unsent(&mut self, now: Instant, unsent: Outcome) {
+        let given = self.active.as_ref().and_then(|active| active.setpoint_given);
+        let last = || self.status.as_ref().map(|status| status.seen(now));
+        let outcome = match (given, unsent) {
+            (Some(setpoint), Outcome::Expired) => Outcome::not_started(setpoint, None, last()),
+            (Some(setpoint), Outcome::Refused(why)) if !self.stands() => {
+                Outcome::not_started(setpoint, Some(why), last())
+            }
+            (_, unsent) => unsent,
+        };
+        self.end_order(outcome);
+    }
+
     /// The reply to a start, a reset, a release or a save.
     pub(super) fn handle_order_reply(&mut self, now: Instant, result: Result<Option<Status>>) {
         let Some(Active { phase: Phase::Sending(job), order, .. }) = self.active else {
@@ -107,7 +122,7 @@ impl Supervisor {
             }
             Err(error) if matches!(error.kind(), ErrorKind::Refused | ErrorKind::Unsupported) => {
                 self.note_exchange(now, &error);
-                self.end_order(Outcome::Refused(error.into()));
+                self.end_unsent(now, Outcome::Refused(error.into()));
             }
             // The family has looked for as long as it takes: nobody here knows better.
             Err(error) if error.kind() == ErrorKind::NotConfirmed => {
@@ -170,7 +185,7 @@ impl Supervisor {
                 if shows(*job, &status) {
                     self.end_order(Outcome::Confirmed);
                 } else if let Some(outcome) = denied(error) {
-                    self.end_order(outcome);
+                    self.end_unsent(now, outcome);
                 }
             }
         }
@@ -201,7 +216,7 @@ impl Supervisor {
             }
             _ => {
                 if let Some(outcome) = denied {
-                    self.end_order(outcome);
+                    self.end_unsent(now, outcome);
                 }
             }
         }

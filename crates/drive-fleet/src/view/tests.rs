@@ -196,10 +196,16 @@ fn an_outcome_is_one_of_seven_words_with_its_reason() {
         (Outcome::Confirmed, "confirmed", None),
         (Outcome::NothingStood, "nothing", None),
         (Outcome::Expired, "expired", None),
-        (Outcome::OutcomeUnknown(Unknown { error: None, last: None, stop: None }), "unknown", None),
+        (Outcome::OutcomeUnknown(Unknown::default()), "unknown", None),
         (Outcome::NotConfirmed(over), "not_confirmed", Some("not_remote")),
         (Outcome::NotConfirmed(Unconfirmed::Denied(denied)), "not_confirmed", Some("denied")),
         (Outcome::NotConfirmed(Unconfirmed::Lost), "not_confirmed", Some("offline")),
+        (
+            Outcome::not_started(Frequency::from_hertz(10).into(), None, None),
+            "not_confirmed",
+            Some("not_started"),
+        ),
+        (Outcome::OutcomeUnknown(Unknown { abandoned: true, ..Unknown::default() }), "unknown", None),
         (Outcome::NotConfirmed(Unconfirmed::Superseded), "superseded", Some("later_command")),
         (Outcome::Refused(Refused::Superseded), "superseded", Some("later_command")),
         (Outcome::Refused(Refused::Stopped), "superseded", Some("stop")),
@@ -283,7 +289,8 @@ fn every_kind() -> Vec<EventKind> {
         because: None,
         stop: None,
     };
-    let unknown = Outcome::OutcomeUnknown(Unknown { error: Some(error()), last: Some(seen), stop: None });
+    let unknown =
+        Outcome::OutcomeUnknown(Unknown { error: Some(error()), last: Some(seen), ..Unknown::default() });
     let faults = Faults { present: vec![Fault { code: 9, entry: Some(&OLF) }], ..Faults::default() };
     let trip = Box::new(Trip {
         at: Instant::now(),
@@ -356,6 +363,7 @@ fn every_kind() -> Vec<EventKind> {
         EventKind::ReferenceTaken(Refusal::MotorRunning),
         EventKind::CommandOverridden(Refusal::NotInControl(Control::Panel)),
         EventKind::ContractChanged(Ground::Limits),
+        EventKind::DriverPanicked("it is not written yet".to_owned()),
         EventKind::LineFinding {
             finding: Finding {
                 defect: Defect::FirstByteCut,

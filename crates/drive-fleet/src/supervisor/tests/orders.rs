@@ -64,6 +64,81 @@ fn an_order_that_was_not_sent_in_its_lifetime_expires_and_is_never_sent() {
     assert_eq!(rig.drive.writes(), []);
 }
 
+/// A drive that runs at 40 Hz or stands, and a start at 10 Hz whose setpoint it has been given.
+fn given_behind_forty_hertz(runs: bool, answered_after: Duration) -> (Rig, CallId) {
+    let mut rig = Rig::ready();
+    if runs {
+        rig.order(run_at(40));
+        rig.pass(1_000 * MS);
+    }
+    rig.drive.log.clear();
+    let id = rig.order(run_at(10));
+    let step = rig.machine.next(rig.now);
+    let Step::Do { job: job @ Job::SetSetpoint(..), .. } = step else { panic!("{step:?}") };
+    let reply = rig.drive.answer(job);
+    rig.now += answered_after;
+    rig.machine.handle_reply(rig.now, reply);
+    (rig, id)
+}
+
+/// Its setpoint, and why its run word was not sent.
+fn not_started(outcome: Option<&Outcome>) -> Option<(drive_core::Setpoint, Option<Refused>)> {
+    match outcome? {
+        Outcome::NotConfirmed(Unconfirmed::NotStarted { setpoint, why, last: Some(_) }) => {
+            Some((*setpoint, why.clone()))
+        }
+        _ => None,
+    }
+}
+
+/// `Expired`: "Its lifetime ran out before it was sent. It never will be." Its setpoint was, and a motor that runs follows it.
+#[test]
+fn a_start_whose_time_is_over_behind_its_setpoint_tells_that_the_drive_has_that_and_that_it_was_not_started()
+{
+    let ten = Frequency::from_hertz(10).into();
+    for runs in [true, false] {
+        let (mut rig, id) = given_behind_forty_hertz(runs, 1_001 * MS);
+        rig.pass(3_000 * MS);
+        let writes = rig.drive.writes();
+        assert!(
+            matches!(writes[..], [Job::SetSetpoint(given, _)] if given == ten),
+            "runs: {runs}, {writes:?}"
+        );
+        assert_eq!(not_started(rig.outcome(id)), Some((ten, None)), "runs: {runs}, {:?}", rig.outcome(id));
+        let told = rig.outcome(id).map(ToString::to_string).unwrap_or_default();
+        assert!(told.contains("its setpoint of 10.00 Hz is in the drive"), "{told}");
+        assert_eq!(rig.snapshot().setpoint, Some(ten));
+    }
+}
+
+#[test]
+fn a_start_whose_run_word_waits_too_long_for_the_line_behind_its_setpoint_is_told_so_too() {
+    let ten = Frequency::from_hertz(10).into();
+    let (mut rig, id) = given_behind_forty_hertz(false, 20 * MS);
+    rig.drive.failing = Some(PortError::Expired);
+    rig.pass(20 * MS);
+    rig.drive.failing = None;
+    rig.pass(3_000 * MS);
+    assert_eq!(not_started(rig.outcome(id)), Some((ten, None)), "{:?}", rig.outcome(id));
+}
+
+/// `Refused`: "It was refused; nothing moved because of it."
+#[test]
+fn a_start_that_the_drive_refuses_behind_its_setpoint_is_refused_where_its_motor_stands_and_nowhere_else() {
+    let (ten, reason) = (Frequency::from_hertz(10).into(), Refusal::Settings("a test"));
+    for runs in [true, false] {
+        let (mut rig, id) = given_behind_forty_hertz(runs, 20 * MS);
+        rig.drive.withholds_starts = Some(reason);
+        rig.pass(1_000 * MS);
+        let refused = Refused::Because(reason);
+        if runs {
+            assert_eq!(not_started(rig.outcome(id)), Some((ten, Some(refused))), "{:?}", rig.outcome(id));
+        } else {
+            assert_eq!(rig.outcome(id), Some(&Outcome::Refused(refused)));
+        }
+    }
+}
+
 #[test]
 fn a_start_whose_answer_was_lost_is_read_back_and_confirmed() {
     let mut rig = Rig::ready();

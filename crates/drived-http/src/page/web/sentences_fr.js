@@ -26,6 +26,8 @@ export const SENTENCES_FR = {
   'the daemon is about to end: until it has, only stops are carried out': 'le service est sur le point de s’arrêter : d’ici là, seuls les arrêts sont exécutés',
   'the fleet has shut down': 'le service est arrêté',
   'no run command of this side stood any more': 'aucun ordre de marche de ce côté n’était plus donné',
+  'the fleet has ended meanwhile: it was sent, or may have been, and nobody looks after it any more':
+    'le service s’est arrêté entre-temps : il a été envoyé, ou peut l’avoir été, et personne ne le suit plus',
   'its time was over before it was sent: it never will be': 'son délai est passé avant l’envoi : il ne sera jamais envoyé',
   'another start of a group was under way': 'un autre démarrage de groupe était en cours',
   'nobody of the group was started: another of its drives was not ready': 'aucun variateur du groupe n’a été démarré : un autre n’était pas prêt',

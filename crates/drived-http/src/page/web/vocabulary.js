@@ -136,6 +136,7 @@ const WORDS = {
   number_zero: ['Transaction number 0', 'Numéro de transaction 0'],
   fell_silent: ['Fell silent', 'Devenu muet'],
   link_timeout: ['Late acknowledgements', 'Acquittements tardifs'],
+  driver_panicked: ['Driver panicked', 'Pilote défaillant'],
   value_withdrawn: ['Value withdrawn', 'Valeur retirée'],
   output_blocked: ['Output blocked', 'Sortie bloquée'],
   reference_taken: ['Reference taken', 'Consigne prise'],

@@ -289,6 +289,11 @@ impl Work {
                 let text = "nobody of the group was started: another of its drives was not ready";
                 self.end_all(OutcomeWord::Refused, GROUP_NOT_READY, text);
             }
+            Err(GroupFailure::Abandoned(outcomes)) => {
+                for (name, outcome) in outcomes {
+                    self.end_of(&name, &outcome);
+                }
+            }
             Err(GroupFailure::Failed { outcomes, .. }) => {
                 for (name, outcome) in outcomes {
                     self.end_of(&name, &outcome);
