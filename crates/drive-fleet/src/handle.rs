@@ -83,7 +83,8 @@ impl Entry {
     }
 }
 
-/// One drive of a fleet. Cheap to clone; the drive is supervised as long as any handle of the fleet lives.
+/// One drive of a fleet. Cheap to clone; the drive is supervised as long as any handle of the fleet lives, and until a stop that was given
+/// has ended: see [`Fleet`](crate::Fleet).
 ///
 /// # Commands
 /// Each method that commands the drive has **given the command when it returns**, before anything is awaited, and returns a

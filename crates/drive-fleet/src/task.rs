@@ -42,10 +42,10 @@ pub(crate) struct Task {
 }
 
 impl Task {
-    /// Runs until the fleet has shut down, or nobody holds it any more.
+    /// Runs until the fleet has shut down, or nobody holds it any more and each stop that was given has ended.
     pub(crate) async fn run(self) {
         let Self { mut drive, mut desk, mut messages, mut urgent, turns, mut keeper, answers } = self;
-        let mut open = true;
+        let (mut open, mut held) = (true, true);
         let mut losses = answers.port_losses();
         let mut retractions = answers.retractions();
         // Kept across the steps, so that a drive does not lose its place in the row.
@@ -140,8 +140,15 @@ impl Task {
                 let alarm_at = desk.supervisor.stop_alarm_at().filter(|_| talking);
                 let drops = tokio::select! {
                     biased;
-                    message = urgent.recv() => match message {
+                    message = urgent.recv(), if held => match message {
                         Some(message) => desk.handle_urgent(message),
+                        None if desk.supervisor.handle_unheld() => {
+                            held = false;
+                            // What waits behind the stop would move what it has stopped.
+                            messages.close();
+                            while messages.try_recv().is_ok() {}
+                            false
+                        }
                         None => return,
                     },
                     message = messages.recv(), if open => match message {
