@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use drive_bus::Slave;
+use drive_bus::{Latest, Slave};
 use drive_core::{Direction, Drive, Error, Lease, Lifetimes, Setpoint};
 use futures_util::future::poll_immediate;
 use tokio::{
@@ -74,13 +74,13 @@ impl Task {
                 keeper.note_stop(stop);
             }
             if losses.has_changed().unwrap_or(false) {
-                losses.mark_unchanged();
+                losses.look();
                 desk.supervisor.handle_line_lost(Instant::now());
             }
             if let Some(ground) = drive.take_changed() {
                 desk.supervisor.handle_changed(Instant::now(), ground);
             }
-            retractions.mark_unchanged();
+            retractions.look();
             if let Some(at) = answers.retracted() {
                 desk.supervisor.handle_retracted(Instant::now(), at);
             }
@@ -216,7 +216,7 @@ impl Task {
 }
 
 /// Until the line counts one more.
-async fn changed(count: &mut watch::Receiver<u64>) {
+async fn changed(count: &mut Latest<u64>) {
     if count.changed().await.is_err() {
         // Nobody will tell it any more.
         std::future::pending::<()>().await;
