@@ -73,6 +73,7 @@ pub mod evidence;
 #[doc(hidden)]
 pub mod exchange;
 mod gateway;
+mod latest;
 mod line;
 pub mod listen;
 #[doc(hidden)]
@@ -101,6 +102,7 @@ pub mod unite;
 pub use config::Rs485;
 pub use config::{Echo, Endpoint, LineConfig, SlaveSettings};
 pub use gateway::{Gateway, GatewayError};
+pub use latest::{Ended, Latest};
 pub use line::Line;
 pub use protocol::Protocol;
 pub use slave::Slave;

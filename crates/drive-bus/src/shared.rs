@@ -12,6 +12,7 @@ use tokio::{
 
 use crate::{
     capture::{Last, Tap},
+    latest::Latest,
     master::{Master, Outcome},
 };
 
@@ -98,8 +99,8 @@ impl Shared {
     }
 
     /// How often the port was lost, for who waits for that.
-    pub(crate) fn losses(&self) -> watch::Receiver<u64> {
-        self.losses.subscribe()
+    pub(crate) fn losses(&self) -> Latest<u64> {
+        self.losses.subscribe().into()
     }
 
     /// So many values were withdrawn so far.
@@ -108,8 +109,8 @@ impl Shared {
     }
 
     /// How many values were withdrawn, for who waits for the next.
-    pub(crate) fn retractions(&self) -> watch::Receiver<u64> {
-        self.retractions.subscribe()
+    pub(crate) fn retractions(&self) -> Latest<u64> {
+        self.retractions.subscribe().into()
     }
 
     /// The task has gone: what is under way ends as where a port is lost, and nothing is taken any more.

@@ -4,7 +4,7 @@ use std::{fmt, io, sync::Arc};
 
 use async_trait::async_trait;
 use drive_core::{Port, PortError, SlaveAddress, Terms};
-use tokio::{sync::watch, time::Instant};
+use tokio::time::Instant;
 use tokio_modbus::{
     ExceptionCode, Request, Response,
     client::{Client, Context},
@@ -12,6 +12,7 @@ use tokio_modbus::{
 };
 
 use crate::{
+    latest::Latest,
     schedule::Ticket,
     shared::{Caller, Handle},
 };
@@ -80,7 +81,7 @@ impl Slave {
 
     /// How many values of all slaves of its line were withdrawn: whenever that changes [`retracted`](Self::retracted) may have.
     #[must_use]
-    pub fn retractions(&self) -> watch::Receiver<u64> {
+    pub fn retractions(&self) -> Latest<u64> {
         self.handle.shared.retractions()
     }
 
@@ -94,7 +95,7 @@ impl Slave {
     /// How often its line has lost its port. Behind each loss, however short, another slave may answer: the one that is behind the
     /// address or the adapter that the port has then.
     #[must_use]
-    pub fn port_losses(&self) -> watch::Receiver<u64> {
+    pub fn port_losses(&self) -> Latest<u64> {
         self.handle.shared.losses()
     }
 

@@ -524,7 +524,7 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
         messages,
         urgent,
         calls: Arc::default(),
-        snapshots: snapshot,
+        snapshots: snapshot.into(),
         exit: exited,
     })
 }

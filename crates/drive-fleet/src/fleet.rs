@@ -37,8 +37,14 @@ use crate::{
 /// [`remove`](Self::remove), [`remove_line`](Self::remove_line). The others notice nothing of it, and neither do readers of
 /// events.
 ///
-/// [`shutdown`](Self::shutdown) is the end that acts by each drive's policy. When the last handle is dropped without it
-/// the tasks end and nothing is written: the drives go on until their own watchdogs act.
+/// [`shutdown`](Self::shutdown) is the end that acts by each drive's policy. When the last handle is dropped without it nothing more is
+/// begun: what waits to be sent is refused, and a drive that is not being stopped is asked no more and goes on until its own watchdog acts.
+/// **A stop that was given outlives the handles**: its drive is asked and stopped until it shows standstill, or until the time of the stop
+/// is over, which is an alarm. So do the policies of a shut-down that was begun. Then the drive's task ends, with the last of a line the
+/// line closes unless somebody holds it, and nothing more is written.
+///
+/// The tasks live in the tokio runtime that the fleet was started in. **Where that ends, everything ends with it**, a stop under way, too:
+/// whoever lets it go awaits the ticket of the stop, or [`shutdown`](Self::shutdown), before.
 ///
 /// ```
 /// use drive_atv312::Atv312;
@@ -160,7 +166,7 @@ impl Fleet {
     /// The policies are on their way when this returns.
     ///
     /// # Cancellation
-    /// When the future is dropped the policies go on, without a limit, and the drives are asked on.
+    /// When the future is dropped the policies go on, without a limit, and the drives are asked on for as long as a handle is left.
     #[must_use = "a drive that was not stopped may run"]
     pub fn shutdown(
         &self,

@@ -279,7 +279,7 @@ impl Group {
             if let Some(write) = of_line.common_write(&standing, order.mode).filter(|_| by_broadcast) {
                 broadcasts.push((Arc::clone(&line.name), self.broadcast(line, write)));
             }
-            let is_silent = |member: &DriveHandle| member.entry.snapshots.borrow().link != Link::Connected;
+            let is_silent = |member: &DriveHandle| member.entry.snapshots.now().link != Link::Connected;
             let silent = members.iter().map(|(_, member)| u32::from(is_silent(member))).sum();
             let patience = line.plan().stop_all(MUTE.max(silent)) + line.line.worst_case_stop();
             for (number, member) in members {
@@ -458,7 +458,7 @@ impl OfLine<'_> {
         };
         let first = write(on_line().next()?)?;
         let is_common = on_line().all(|entry| write(entry) == Some(first));
-        let under_way = |entry: &Arc<Entry>| entry.snapshots.borrow().stop.map(|stop| strength(stop.mode));
+        let under_way = |entry: &Arc<Entry>| entry.snapshots.now().stop.map(|stop| strength(stop.mode));
         let (all, any) = on_line().map(under_way).fold((true, false), |(all, any), stop| {
             (all && stop >= Some(strength(mode)), any || stop > Some(strength(mode)))
         });

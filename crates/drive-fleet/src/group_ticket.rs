@@ -19,7 +19,7 @@ use crate::{
 /// A stop that was given to several drives: all of it is on its way, whether or not anybody awaits this.
 ///
 /// Awaiting it gives what [`finished`](Self::finished) gives. **A stop is never withdrawn**: when this is dropped every drive is
-/// stopped all the same, and each drive's own task repeats its stop until the drive stands.
+/// stopped all the same, and each drive's own task repeats its stop until the drive stands, as of a [`StopTicket`].
 #[derive(Debug, Clone)]
 #[must_use = "a stop that is not confirmed is an alarm"]
 pub struct GroupStop {

@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use drive_bus::Line;
+use drive_bus::{Latest, Line};
 use drive_core::{
     BroadcastWrite, Capabilities, Direction, Faults, Row, Setpoint, SlaveAddress, StopMode,
     WatchdogCapability, Written,
@@ -53,7 +53,7 @@ pub(crate) struct Entry {
     pub(crate) urgent: mpsc::UnboundedSender<Urgent>,
     /// The number of the last call.
     pub(crate) calls: Arc<AtomicU64>,
-    pub(crate) snapshots: watch::Receiver<Arc<Snapshot>>,
+    pub(crate) snapshots: Latest<Arc<Snapshot>>,
     pub(crate) exit: watch::Receiver<Option<(ExitAction, Left)>>,
 }
 
@@ -84,7 +84,8 @@ impl Entry {
     }
 }
 
-/// One drive of a fleet. Cheap to clone; the drive is supervised as long as any handle of the fleet lives.
+/// One drive of a fleet. Cheap to clone; the drive is supervised as long as any handle of the fleet lives, and until a stop that was given
+/// has ended: see [`Fleet`](crate::Fleet).
 ///
 /// # Commands
 /// Each method that commands the drive has **given the command when it returns**, before anything is awaited, and returns a
@@ -198,7 +199,7 @@ impl DriveHandle {
     /// What is known of it now.
     #[must_use]
     pub fn snapshot(&self) -> Arc<Snapshot> {
-        Arc::clone(&self.entry.snapshots.borrow())
+        self.entry.snapshots.now()
     }
 
     /// The time of the communication watchdog that runs in the drive, as far as is known: as it was read last, or the one that
@@ -214,9 +215,9 @@ impl DriveHandle {
         read.and_then(|found| found.timeout).or(fixed)
     }
 
-    /// What is known of it, and a notice of every change. A reader that is slow sees the latest.
+    /// What is known of it, and a notice of every change. A reader that is slow sees the latest, and holds up nobody.
     #[must_use]
-    pub fn watch(&self) -> watch::Receiver<Arc<Snapshot>> {
+    pub fn watch(&self) -> Latest<Arc<Snapshot>> {
         self.entry.snapshots.clone()
     }
 
@@ -225,11 +226,8 @@ impl DriveHandle {
     /// # Cancellation
     /// Safe to drop.
     pub async fn wait_until(&self, mut is_so: impl FnMut(&Snapshot) -> bool) -> Arc<Snapshot> {
-        let mut watch = self.watch();
-        match watch.wait_for(|snapshot| is_so(snapshot)).await {
-            Ok(snapshot) => Arc::clone(&snapshot),
-            Err(_) => self.snapshot(),
-        }
+        let there = self.watch().until(|snapshot| is_so(snapshot)).await;
+        there.unwrap_or_else(|_| self.snapshot())
     }
 
     /// Waits until a start would be sent: the drive answers, was identified, its watchdog verified, and nothing stands in
@@ -242,7 +240,7 @@ impl DriveHandle {
         let mut over = pin!(sleep(patience));
         let mut watch = self.watch();
         loop {
-            watch.mark_unchanged();
+            watch.look();
             let Some(refused) = self.unready().await else { return Ok(()) };
             tokio::select! {
                 changed = watch.changed() => if changed.is_err() {

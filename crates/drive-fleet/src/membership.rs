@@ -85,7 +85,7 @@ impl Fleet {
         check_exchange(&entry, &settings)?;
         let settings = Arc::new(settings);
         let name: Arc<str> = Arc::from(settings.name.as_str());
-        let now = Snapshot { name: Arc::clone(&name), ..Snapshot::clone(&entry.snapshots.borrow()) };
+        let now = Snapshot { name: Arc::clone(&name), ..Snapshot::clone(&entry.snapshots.now()) };
         let (told, snapshots) = watch::channel(Arc::new(now));
         let renamed = Arc::new(Entry {
             name,
@@ -99,7 +99,7 @@ impl Fleet {
             messages: entry.messages.clone(),
             urgent: entry.urgent.clone(),
             calls: Arc::clone(&entry.calls),
-            snapshots,
+            snapshots: snapshots.into(),
             exit: entry.exit.clone(),
         });
         *entry.settings.write().unwrap_or_else(PoisonError::into_inner) = Arc::clone(&settings);

@@ -8,9 +8,15 @@ use std::{
     time::Duration,
 };
 
+<<<<<<< HEAD
 use drive_bus::Slave;
 use drive_core::{Drive, Lease};
 use futures_util::{FutureExt, future::poll_immediate};
+=======
+use drive_bus::{Latest, Slave};
+use drive_core::{Direction, Drive, Error, Lease, Lifetimes, Setpoint};
+use futures_util::future::poll_immediate;
+>>>>>>> 76d9241ce12adfc47f4730b3f3351d545827fff7
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
     time::{Instant, sleep, sleep_until},
@@ -48,6 +54,7 @@ pub(crate) struct Task {
 }
 
 impl Task {
+<<<<<<< HEAD
     /// Runs until the fleet has shut down, or nobody holds it any more. **No panic ends it**: a motor whose driver has a fault is to be
     /// stopped all the same.
     pub(crate) async fn run(self) {
@@ -93,6 +100,14 @@ impl Talk {
     /// Until it is over.
     async fn go_on(&mut self) {
         let Self { driver, desk, messages, open, urgent, turns, keeper, answers, losses, retractions } = self;
+=======
+    /// Runs until the fleet has shut down, or nobody holds it any more and each stop that was given has ended.
+    pub(crate) async fn run(self) {
+        let Self { mut drive, mut desk, mut messages, mut urgent, turns, mut keeper, answers } = self;
+        let (mut open, mut held) = (true, true);
+        let mut losses = answers.port_losses();
+        let mut retractions = answers.retractions();
+>>>>>>> 76d9241ce12adfc47f4730b3f3351d545827fff7
         // Kept across the steps, so that a drive does not lose its place in the row.
         let mut waits_for_turn = None;
         let mut turn: Option<OwnedSemaphorePermit> = None;
@@ -117,13 +132,13 @@ impl Talk {
                 keeper.note_stop(stop);
             }
             if losses.has_changed().unwrap_or(false) {
-                losses.mark_unchanged();
+                losses.look();
                 desk.supervisor.handle_line_lost(Instant::now());
             }
             if let Some(ground) = driver.take_changed() {
                 desk.supervisor.handle_changed(Instant::now(), ground);
             }
-            retractions.mark_unchanged();
+            retractions.look();
             if let Some(at) = answers.retracted() {
                 desk.supervisor.handle_retracted(Instant::now(), at);
             }
@@ -187,8 +202,15 @@ impl Talk {
                 let alarm_at = desk.supervisor.stop_alarm_at().filter(|_| talking);
                 let drops = tokio::select! {
                     biased;
-                    message = urgent.recv() => match message {
+                    message = urgent.recv(), if held => match message {
                         Some(message) => desk.handle_urgent(message),
+                        None if desk.supervisor.handle_unheld() => {
+                            held = false;
+                            // What waits behind the stop would move what it has stopped.
+                            messages.close();
+                            while messages.try_recv().is_ok() {}
+                            false
+                        }
                         None => return,
                     },
                     message = messages.recv(), if *open => match message {
@@ -256,7 +278,7 @@ impl Talk {
 }
 
 /// Until the line counts one more.
-async fn changed(count: &mut watch::Receiver<u64>) {
+async fn changed(count: &mut Latest<u64>) {
     if count.changed().await.is_err() {
         // Nobody will tell it any more.
         std::future::pending::<()>().await;

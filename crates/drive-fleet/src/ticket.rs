@@ -156,7 +156,8 @@ impl fmt::Debug for Ticket {
 /// A stop that was given to a drive: it is on its way, ahead of everything, whether or not anybody awaits this.
 ///
 /// Awaiting it gives what [`finished`](Self::finished) gives. **A stop is never withdrawn**: when the ticket is dropped it is
-/// repeated all the same until the drive stands.
+/// repeated all the same until the drive stands, or until its time is over where no handle of the fleet is left. Only the runtime of the
+/// fleet ends it, by its own end.
 ///
 /// # Example
 ///

@@ -10,9 +10,10 @@ use std::{
     time::Duration,
 };
 
+use drive_bus::Latest;
 use drive_core::Status;
 use drive_sim::{Intervention, SimSlave};
-use tokio::{sync::watch, task::JoinHandle, time::Instant};
+use tokio::{task::JoinHandle, time::Instant};
 
 use crate::{
     truth::{TOLERANCE, contradiction},
@@ -54,14 +55,14 @@ impl Witnesses {
     pub fn attend<T: Send + Sync + 'static>(
         &mut self,
         machine: &SimSlave,
-        mut published: watch::Receiver<Arc<T>>,
+        published: impl Into<Latest<Arc<T>>>,
         says: fn(&T) -> Option<Told>,
     ) {
         let mut witness = Witness::of(machine);
-        let against = Arc::clone(&self.against);
+        let (mut published, against) = (published.into(), Arc::clone(&self.against));
         self.attending.push(tokio::spawn(async move {
             loop {
-                let told = says(&published.borrow_and_update());
+                let told = says(&published.look());
                 if let Some(objection) = told.and_then(|told| witness.objects(&told)) {
                     against.lock().unwrap_or_else(PoisonError::into_inner).push(objection);
                 }

@@ -108,7 +108,7 @@ async fn follow(drive: DriveHandle, inbox: Inbox, clocks: Clocks) {
     let (mut departure, mut gone, mut stop_key) = (Departure::default(), Gone::default(), StopKey::default());
     let numbers = numbers(drive.capabilities());
     loop {
-        let snapshot = Arc::clone(&watch.borrow_and_update());
+        let snapshot = watch.look();
         if let Some(left) = departure.look(&snapshot) {
             inbox.record(fact(&drive, clocks.now(), "output_departed", &left));
         }

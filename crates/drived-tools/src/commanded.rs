@@ -160,7 +160,7 @@ impl Commanded {
                     }));
                 }
                 Ok(()) = watch.changed() => {
-                    let Some(pending) = watch.borrow_and_update().stop else { continue };
+                    let Some(pending) = watch.look().stop else { continue };
                     let first = pending.taken && !std::mem::replace(&mut taken, pending.taken);
                     if first {
                         self.tell_what_it_took().await;

@@ -28,7 +28,7 @@ async fn longest_gaps(drive: DriveHandle, end: Instant) -> (Duration, Duration) 
     let mut last: Option<(Instant, Instant)> = None;
     let mut longest = (Duration::ZERO, Duration::ZERO);
     while let Ok(Ok(())) = timeout_at(end, snapshots.changed()).await {
-        let snapshot = snapshots.borrow_and_update().clone();
+        let snapshot = snapshots.look();
         let (Some(status), Some(slow)) = (&snapshot.status, &snapshot.measurements) else { continue };
         if let Some((status_before, slow_before)) = last {
             longest = (longest.0.max(status.at - status_before), longest.1.max(slow.at - slow_before));

@@ -3,7 +3,7 @@
 use drive_core::{Error, Result, StopMode, Watchdog};
 use tokio::time::Instant;
 
-use super::{Asker, Job, Supervisor};
+use super::{Asker, Job, Supervisor, stopping::Stopping};
 use crate::{
     cause::{Cause, Policy},
     event::{EventKind, ExitAction},
@@ -102,6 +102,22 @@ impl Supervisor {
         matches!(self.in_flight, Some(Job::Status { .. } | Job::KeepAlive))
     }
 
+    /// Nobody holds the drive any more, and nothing more can be asked of it. Gives whether it goes on all the same: a stop that was given,
+    /// and a policy that acts, outlive whoever has asked for them. What waits to move the motor does not.
+    pub(crate) fn handle_unheld(&mut self) -> bool {
+        self.is_unheld = true;
+        if self.exit == Exit::No {
+            self.refuse_queue();
+        }
+        self.owes_an_end()
+    }
+
+    /// Whether somebody was promised an end that has not come yet: that of a stop within its time, or that of the exit.
+    fn owes_an_end(&self) -> bool {
+        let exits = !matches!(self.exit, Exit::No | Exit::Done(_));
+        exits || self.stopping.as_ref().is_some_and(Stopping::has_time)
+    }
+
     /// What was done at the exit, once it is.
     pub(crate) const fn exit_action(&self) -> Option<&ExitAction> {
         match &self.exit {
@@ -112,6 +128,9 @@ impl Supervisor {
 
     /// Whether the conversation is over, which is told once.
     pub(super) fn is_gone(&mut self) -> bool {
+        if self.is_unheld {
+            return !self.owes_an_end();
+        }
         let Exit::Done(action) = &self.exit else { return false };
         match self.leaving {
             Leaving::No => return false,

@@ -158,6 +158,8 @@ pub(crate) struct Supervisor {
     /// Why it ends.
     exits_by: Policy,
     leaving: Leaving,
+    /// Nobody holds it any more.
+    is_unheld: bool,
     /// Who asked for the last start that was sent.
     started_by: Option<CallId>,
     /// The run command of this side that stands in the drive, or may, as the family keeps it.
@@ -238,6 +240,7 @@ impl Supervisor {
             exit: Exit::No,
             exits_by: Policy::Exit,
             leaving: Leaving::No,
+            is_unheld: false,
             started_by: None,
             lease: None,
             ledger: Ledger::new(now, settings.eeprom_before.clone()),

@@ -166,6 +166,11 @@ impl Stopping {
         let waiters = self.waiters.iter().map(|waiter| waiter.until);
         waiters.chain(self.alarm_at).min()
     }
+
+    /// Whether its time is not over yet, for whoever waits for it or until its lack of confirmation is an alarm.
+    pub(super) fn has_time(&self) -> bool {
+        self.alarm_at().is_some()
+    }
 }
 
 impl Supervisor {

@@ -71,7 +71,7 @@ impl Teller {
         let (heartbeat, interval) = (self.face.config.heartbeat, self.face.config.interval);
         let mut told: Option<Told> = None;
         loop {
-            let snapshot = Arc::clone(&watch.borrow_and_update());
+            let snapshot = watch.look();
             let (now, again) = (Instant::now(), anew.has_changed().unwrap_or(false));
             anew.mark_unchanged();
             let (head, gist) = (Head::of(&snapshot, now), Gist::of(&snapshot, now));

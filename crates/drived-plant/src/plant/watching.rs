@@ -103,7 +103,7 @@ async fn changes(plant: Weak<Inner>, line: Arc<str>, drive: DriveHandle) {
     let mut told: Option<(Gist, Instant)> = None;
     loop {
         let now = Instant::now();
-        let snapshot = Arc::clone(&watch.borrow_and_update());
+        let snapshot = watch.look();
         let known = Gist::of(&snapshot, now);
         // Also where nothing is new: what is not seen for long enough becomes an alarm by that alone.
         let Some(looked_for) = plant.upgrade() else { return };

@@ -10,7 +10,7 @@ use super::{Action, OutcomeWord};
 pub(super) async fn settled(action: Action, drive: &DriveHandle, ended: Instant) -> Option<OutcomeWord> {
     let (mut verdict, mut watch) = (None, drive.watch());
     watch
-        .wait_for(|snapshot| {
+        .until(|snapshot| {
             verdict = verdict_of(action, snapshot, ended);
             verdict.is_some()
         })
