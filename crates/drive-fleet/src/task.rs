@@ -8,15 +8,9 @@ use std::{
     time::Duration,
 };
 
-<<<<<<< HEAD
-use drive_bus::Slave;
+use drive_bus::{Latest, Slave};
 use drive_core::{Drive, Lease};
 use futures_util::{FutureExt, future::poll_immediate};
-=======
-use drive_bus::{Latest, Slave};
-use drive_core::{Direction, Drive, Error, Lease, Lifetimes, Setpoint};
-use futures_util::future::poll_immediate;
->>>>>>> 76d9241ce12adfc47f4730b3f3351d545827fff7
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
     time::{Instant, sleep, sleep_until},
@@ -54,8 +48,7 @@ pub(crate) struct Task {
 }
 
 impl Task {
-<<<<<<< HEAD
-    /// Runs until the fleet has shut down, or nobody holds it any more. **No panic ends it**: a motor whose driver has a fault is to be
+    /// Runs until the fleet has shut down, or nobody holds it any more and each stop that was given has ended. **No panic ends it**: a motor whose driver has a fault is to be
     /// stopped all the same.
     pub(crate) async fn run(self) {
         let Self { drive, desk, messages, urgent, turns, keeper, answers } = self;
@@ -65,6 +58,7 @@ impl Task {
             desk,
             messages,
             open: true,
+            held: true,
             urgent,
             turns,
             keeper,
@@ -88,26 +82,21 @@ struct Talk {
     messages: mpsc::Receiver<Message>,
     /// Somebody may still send some.
     open: bool,
+    /// Somebody holds the fleet.
+    held: bool,
     urgent: mpsc::UnboundedReceiver<Urgent>,
     turns: Arc<Semaphore>,
     keeper: Keeper,
     answers: Slave,
-    losses: watch::Receiver<u64>,
-    retractions: watch::Receiver<u64>,
+    losses: Latest<u64>,
+    retractions: Latest<u64>,
 }
 
 impl Talk {
     /// Until it is over.
     async fn go_on(&mut self) {
-        let Self { driver, desk, messages, open, urgent, turns, keeper, answers, losses, retractions } = self;
-=======
-    /// Runs until the fleet has shut down, or nobody holds it any more and each stop that was given has ended.
-    pub(crate) async fn run(self) {
-        let Self { mut drive, mut desk, mut messages, mut urgent, turns, mut keeper, answers } = self;
-        let (mut open, mut held) = (true, true);
-        let mut losses = answers.port_losses();
-        let mut retractions = answers.retractions();
->>>>>>> 76d9241ce12adfc47f4730b3f3351d545827fff7
+        let Self { driver, desk, messages, open, held, urgent, turns, keeper, answers, losses, retractions } =
+            self;
         // Kept across the steps, so that a drive does not lose its place in the row.
         let mut waits_for_turn = None;
         let mut turn: Option<OwnedSemaphorePermit> = None;
@@ -202,10 +191,10 @@ impl Talk {
                 let alarm_at = desk.supervisor.stop_alarm_at().filter(|_| talking);
                 let drops = tokio::select! {
                     biased;
-                    message = urgent.recv(), if held => match message {
+                    message = urgent.recv(), if *held => match message {
                         Some(message) => desk.handle_urgent(message),
                         None if desk.supervisor.handle_unheld() => {
-                            held = false;
+                            *held = false;
                             // What waits behind the stop would move what it has stopped.
                             messages.close();
                             while messages.try_recv().is_ok() {}
