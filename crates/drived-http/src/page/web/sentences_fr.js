@@ -26,8 +26,8 @@ export const SENTENCES_FR = {
   'the daemon is about to end: until it has, only stops are carried out': 'le service est sur le point de s’arrêter : d’ici là, seuls les arrêts sont exécutés',
   'the fleet has shut down': 'le service est arrêté',
   'no run command of this side stood any more': 'aucun ordre de marche de ce côté n’était plus donné',
-  'the fleet has ended meanwhile: it was sent, or may have been, and nobody looks after it any more':
-    'le service s’est arrêté entre-temps : il a été envoyé, ou peut l’avoir été, et personne ne le suit plus',
+  'its time was over': 'son délai est passé',
+  'the fleet has ended meanwhile: it was sent, or may have been, and nobody looks after it any more': 'le service s’est arrêté entre-temps : il a été envoyé, ou peut l’avoir été, et personne ne le suit plus',
   'its time was over before it was sent: it never will be': 'son délai est passé avant l’envoi : il ne sera jamais envoyé',
   'another start of a group was under way': 'un autre démarrage de groupe était en cours',
   'nobody of the group was started: another of its drives was not ready': 'aucun variateur du groupe n’a été démarré : un autre n’était pas prêt',
@@ -315,6 +315,7 @@ const PATTERNS = [
   [/^somebody else asks on this line: (\d+) requests in (.+?)\. This scan disturbs him, and he it: end his asking first, then scan again$/, (count, time) => `quelqu’un d’autre interroge cette ligne : ${count} requêtes en ${number(time)}. Cette recherche le gêne, et lui la gêne : mettez fin à ses questions, puis cherchez de nouveau`],
   [/^there is no serial port (.+?)(?:: present: (.+))?$/, (port, there) => `il n’y a pas de port série ${port}${there ? ` ; présents : ${there}` : ''}`],
   [/^the files have changed since they were read, and by them (.+): drived reload first$/, what => `les fichiers ont changé depuis leur lecture, et selon eux ${what} : d’abord drived reload`],
+  [/^its setpoint of (.+) is in the drive, and its run word was not sent: (.+)$/, (setpoint, why) => `sa consigne de ${number(setpoint)} est dans le variateur, et son ordre de marche n’a pas été envoyé : ${french(why)}`],
   [/^after ([\d.]+) s the drive says (.+), ([\d.]+) s ago$/, (after, status, ago) => `après ${number(after)} s le variateur indique ${state(status)}, il y a ${number(ago)} s`],
   [/^the drive has said nothing for ([\d.]+) s$/, time => `le variateur n’a rien dit pendant ${number(time)} s`],
   [/^the drive was last seen (.+), ([\d.]+) s ago$/, (status, ago) => `vu pour la dernière fois ${state(status)}, il y a ${number(ago)} s`],
