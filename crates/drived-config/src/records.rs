@@ -174,10 +174,11 @@ impl<T: Record> Records<T> {
     }
 
     /// The stops that were not confirmed, of drives that are not in the configuration: by their places, which drive each is of.
-    pub fn stops_left(&self) -> BTreeMap<String, String> {
-        let left = |(key, entry): (&String, &Entry<T>)| {
-            let of = entry.name.as_ref().map_or_else(|| key.clone(), |name| format!("{name} ({key})"));
-            (entry.is_alone && entry.record.stops()).then(|| (key.clone(), of))
+    pub fn stops_left(&self) -> BTreeMap<Place, String> {
+        let left = |(place, entry): (&Place, &Entry<T>)| {
+            let of =
+                entry.name.as_ref().map_or_else(|| place.to_string(), |name| format!("{name} ({place})"));
+            (entry.is_alone && entry.record.stops()).then(|| (place.clone(), of))
         };
         self.lock().drives.iter().filter_map(left).collect()
     }

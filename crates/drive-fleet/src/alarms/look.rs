@@ -6,7 +6,10 @@ use drive_bus::evidence::{Defect, Finding};
 use tokio::time::Instant;
 
 use super::table::AlarmKind;
-use crate::snapshot::{Link, Snapshot};
+use crate::{
+    place::Place,
+    snapshot::{Link, Snapshot},
+};
 
 /// A moment by both clocks: what is kept goes by the wall's, for it outlives the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,11 +151,11 @@ impl Look {
     /// At the program, with what is wrong with it, in words, and with the stops that are nobody's: of which drive, by its place. What is
     /// not there is not so.
     #[must_use]
-    pub fn at_program(wrong: &BTreeMap<AlarmKind, String>, stops_left: &BTreeMap<String, String>) -> Self {
+    pub fn at_program(wrong: &BTreeMap<AlarmKind, String>, stops_left: &BTreeMap<Place, String>) -> Self {
         let wrong = wrong.iter().map(|(kind, why)| condition(*kind, None, Some(why.clone())));
-        let left = stops_left
-            .iter()
-            .map(|(place, drive)| condition(AlarmKind::StopLeft, Some(place.clone()), Some(drive.clone())));
+        let left = stops_left.iter().map(|(place, drive)| {
+            condition(AlarmKind::StopLeft, Some(place.to_string()), Some(drive.clone()))
+        });
         let there = wrong.chain(left).collect();
         Self { drive: None, line: None, there, seen: AlarmKind::all().collect() }
     }

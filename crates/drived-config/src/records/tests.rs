@@ -98,9 +98,9 @@ fn what_belongs_to_nobody_is_kept_until_the_place_is_there_again() {
     after.set_all([]);
     assert!(after.write());
     // Whose stop nobody gives is known, and nothing else that is nobody's.
-    assert_eq!(after.stops_left(), BTreeMap::from([(ONE.to_owned(), format!("north ({ONE})"))]));
+    assert_eq!(after.stops_left(), BTreeMap::from([(ONE.into(), format!("north ({ONE})"))]));
     assert_eq!(before.stops_left(), BTreeMap::new());
-    after.call(ONE, "east");
+    after.call(&ONE.into(), "east");
     assert_eq!(after.stops_left(), BTreeMap::new());
     // Whoever comes to its place has it.
     assert_eq!(open(&[("east", ONE)]).of(&ONE.into()), Some(stop.clone()));

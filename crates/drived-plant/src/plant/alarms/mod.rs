@@ -16,7 +16,7 @@ use std::{
 };
 
 use drive_fleet::{
-    RunRecord,
+    Place, RunRecord,
     alarms::{AlarmChange, AlarmKind, AlarmRefused, AlarmView, Alarms},
 };
 use schemars::JsonSchema;
@@ -120,7 +120,7 @@ impl Desk {
     }
 
     /// The stops that are nobody's.
-    fn stops_left(&self) -> BTreeMap<String, String> {
+    fn stops_left(&self) -> BTreeMap<Place, String> {
         self.runs.as_ref().map(Records::stops_left).unwrap_or_default()
     }
 }
