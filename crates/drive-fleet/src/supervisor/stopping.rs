@@ -132,12 +132,15 @@ impl Stopping {
     }
 
     /// A run command has come behind it, kept back on its way or from somebody else: it is written again at once, and has no more time
-    /// than one that was never taken.
-    fn undone(&mut self, now: Instant, status: &Status) {
+    /// than from when it was given, whatever its ramp had gained.
+    fn undone(&mut self, now: Instant, status: &Status, standstill: Duration) {
         self.taken = false;
         (self.was_undone, self.runs_by) = (true, who_runs(status));
         self.next_try = Some(now);
         self.alarm_at = self.alarm_at.map(|at| at.min(self.patient_until));
+        for waiter in self.waiters.iter_mut().filter(|waiter| !waiter.asker.is_exit()) {
+            waiter.until = waiter.until.min(waiter.asked_at + standstill);
+        }
     }
 
     /// The motor comes down by itself. As long as it does, its time begins anew: a long ramp is no alarm, a ramp that hangs is. Not
@@ -373,7 +376,7 @@ impl Supervisor {
             }
             _ if crate::mutant!("untaken-stop-confirmed", !stopping.taken, false) => {}
             Motion::Driven if crate::mutant!("run-behind-a-stop-left", true, false) => {
-                stopping.undone(now, &status.value);
+                stopping.undone(now, &status.value, standstill);
             }
             _ => {
                 if motion == Motion::Braking {

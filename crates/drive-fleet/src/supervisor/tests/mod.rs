@@ -233,9 +233,9 @@ impl Paper {
             Job::Stop(asked) => {
                 if reached && self.obeys {
                     if self.ramps {
-                        self.come_down()
+                        self.come_down();
                     } else {
-                        self.stand()
+                        self.stand();
                     }
                     self.lease = None;
                 }

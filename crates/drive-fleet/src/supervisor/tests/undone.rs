@@ -107,17 +107,18 @@ fn a_stop_that_is_undone_once_and_taken_again_in_its_time_is_no_alarm() {
 }
 
 #[test]
-fn a_stop_that_is_undone_late_on_its_ramp_is_an_alarm_as_soon_as_that_is_seen() {
+fn a_stop_that_is_undone_late_on_its_ramp_is_an_alarm_and_over_as_soon_as_that_is_seen() {
     let mut rig = running();
-    rig.stop(StopMode::Ramp);
+    let id = rig.stop(StopMode::Ramp);
     for hertz in (30..40).rev() {
         rig.drive.status.output_frequency = Some(Frequency::from_hertz(hertz));
         rig.pass(3_000 * MS);
     }
-    assert_eq!(alarms(&rig), 0, "it comes down: {:?}", rig.events());
+    assert!(alarms(&rig) == 0 && rig.outcome(id).is_none(), "it comes down: {:?}", rig.events());
     rig.drive.run();
     rig.pass(1_000 * MS);
     assert_eq!(alarms(&rig), 1, "{:?}", rig.events());
+    assert!(matches!(rig.outcome(id), Some(Outcome::NotConfirmed(_))), "{:?}", rig.outcome(id));
 }
 
 #[test]
