@@ -203,7 +203,7 @@ async fn a_drive_that_is_called_otherwise_is_the_same_and_its_motor_notices_noth
     assert!(runs(&plant, 1) && Plant::writes(&machine) == writes, "nothing is written to it");
     // Who watches it by the old name sees the end of that; a stop by it is a stop.
     let mut watch = old.watch();
-    watch.mark_unchanged();
+    watch.look();
     assert!(watch.changed().await.is_err());
     assert!(old.stop(StopMode::Ramp).await.is_confirmed() && !runs(&plant, 1) && runs(&plant, 2));
     // It leaves by its policy, as every drive does.
