@@ -11,6 +11,7 @@ mod questions;
 mod shown;
 mod stops;
 mod undone;
+mod withdrawn;
 
 use drive_core::{
     Command, Control, Direction, ExceptionMeaning, Exchange, Frequency, Identity, Lack, Lease, Measurements,
