@@ -31,7 +31,8 @@ impl Supervisor {
         match result {
             Ok(()) => self.setpoint_given(now, setpoint),
             Err(error) => {
-                self.given = None;
+                // Where nothing was sent, the drive holds what it held.
+                self.given.take_if(|_| !matches!(error, Error::Setpoint { .. }));
                 let is_start =
                     self.active.as_ref().is_some_and(|active| matches!(active.order, Order::Start { .. }));
                 match error.kind() {
