@@ -178,6 +178,9 @@ impl Fleet {
     }
 }
 
+/// The lines that there are, and the drives that were added.
+pub(crate) type Enlisted = (Vec<Arc<LineEntry>>, Vec<Arc<Entry>>);
+
 impl FleetBuilder {
     /// Begins an addition to a fleet that runs.
     pub(crate) fn addition(members: &Members) -> Self {
@@ -331,10 +334,7 @@ impl FleetBuilder {
     }
 
     /// Starts the drives that are added, if all of it can work: these, and the lines that there are then.
-    pub(crate) fn enlist(
-        self,
-        events: &Teller,
-    ) -> Result<(Vec<Arc<LineEntry>>, Vec<Arc<Entry>>), FleetError> {
+    pub(crate) fn enlist(self, events: &Teller) -> Result<Enlisted, FleetError> {
         let (lines, added) = self.check()?;
         let mut drives = Vec::with_capacity(added.len());
         for member in added {

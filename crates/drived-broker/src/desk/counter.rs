@@ -1,6 +1,6 @@
 //! Behind the desk: carrying out, the audit log, and telling what becomes of it.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use serde_json::json;
 use tokio::{

@@ -208,7 +208,7 @@ async fn a_stop_that_is_nobodys_is_an_alarm_through_restarts_until_its_drive_is_
     let noted = plant.act_on_alarm(&operator(), after.alarm.id, &acknowledge("it stands, I saw it")).unwrap();
     assert_eq!(noted.state, AlarmState::Acknowledged);
     // Its drive is in the configuration again, and is given the stop.
-    assert!(runs.call(PLACE, "mixer"));
+    assert!(runs.call(&PLACE.into(), "mixer"));
     sleep(Duration::from_secs(3)).await;
     assert_eq!(plant.alarms().alarms, []);
 }
