@@ -109,7 +109,7 @@ async fn change_all(report: &mut Report, name: &impl Fn(&str) -> String, fleet: 
         let used = millis(processor_time().saturating_sub(since));
         report.note(SECTION, name(&format!("processor time until all {what}")), Unit::Millis, used);
     };
-    let all: Vec<_> = fleet.drives().iter().map(|drive| drive.settings()).collect();
+    let all: Vec<_> = fleet.drives().iter().map(drive_fleet::DriveHandle::settings).collect();
     let used = processor_time();
     for settings in &all {
         fleet.reconfigure(DriveSettings::clone(settings))?;

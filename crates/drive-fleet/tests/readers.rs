@@ -49,6 +49,12 @@ fn running(plant: &Runtime, ours: &Runtime) -> (Fleet, [SimSlave; 2]) {
     (fleet, machines)
 }
 
+/// No runtime of these tests runs on their own threads.
+#[expect(clippy::disallowed_methods, reason = "it blocks a thread without a runtime, as such a reader does")]
+fn wait(time: Duration) {
+    thread::sleep(time);
+}
+
 /// Both motors come to their stop while a reader of the first holds what `hold` holds. It says when it does, and holds until it is let go.
 fn motors_are_stopped_while(hold: impl FnOnce(DriveHandle, Sender<()>, Receiver<()>) + Send + 'static) {
     let (plant, ours) = (runtime(), runtime());
@@ -58,13 +64,13 @@ fn motors_are_stopped_while(hold: impl FnOnce(DriveHandle, Sender<()>, Receiver<
     let reader = thread::spawn(move || hold(pump, says, until_let_go));
     hears.recv_timeout(PATIENCE).unwrap();
     // By then something new was to be told of the drive.
-    thread::sleep(Duration::from_secs(1));
+    wait(Duration::from_secs(1));
     // Not from here: this thread is to say that it does not come back.
     thread::spawn(move || drop(fleet.stop_all(StopMode::Ramp)));
     let over = Instant::now() + PATIENCE;
     while machines.iter().any(|machine| machine.observe().running) {
         assert!(Instant::now() < over, "a reader holds the stops up");
-        thread::sleep(Duration::from_millis(10));
+        wait(Duration::from_millis(10));
     }
     assert!(!reader.is_finished(), "it was not held any more");
     let_go.send(()).unwrap();
