@@ -263,6 +263,26 @@ async fn what_a_panel_lets_a_motor_do_shows_no_withdrawal() {
     assert!(rig.drive.lease().is_none());
 }
 
+/// The word was written while the panel had it, and it gives control back before that has shown.
+#[tokio::test(start_paused = true)]
+async fn a_withdrawal_that_was_written_to_a_panel_is_written_again_when_it_gives_control_back() {
+    let mut rig = running("goodrive").await;
+    rig.machine.panel(drive_sim::Panel::TakeControl);
+    rig.machine.panel(drive_sim::Panel::Run);
+    rig.drive.status().await.expect("it answers");
+    rig.machine.panel(drive_sim::Panel::Reference(Frequency::from_hertz(5)));
+    let back = async {
+        tokio::time::sleep(Duration::from_millis(150)).await;
+        rig.machine.panel(drive_sim::Panel::ReleaseControl);
+    };
+    let (withdrawn, ()) = tokio::join!(rig.drive.withdraw(), back);
+    withdrawn.expect("the bus has it");
+    // 2000h = 0005h, which such a drive does not take while its panel has it.
+    let received = rig.machine.received();
+    let stops = received.iter().filter(|request| request.pdu[..] == [6, 0x20, 0, 0, 5]).count();
+    assert_eq!(stops, 2);
+}
+
 #[tokio::test(start_paused = true)]
 async fn it_trips_and_is_reset_and_nothing_starts_by_itself() {
     for key in DRIVEN {

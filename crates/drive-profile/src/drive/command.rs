@@ -289,7 +289,7 @@ impl<P: Port> ProfileDrive<P> {
         self.step(step.get_ref(), Class::Command, Order::Withdraw).await?;
         self.registers.owe_judgement();
         let mut confirming = Confirming::begin();
-        let mut first = None;
+        let (mut first, mut was_others) = (None, status.control == Some(Control::Local));
         loop {
             let (status, _) = self.read_status(Class::Command).await.map_err(Error::after_write)?;
             // Where the command reads back, that it holds no run word is seen whoever runs the motor.
@@ -298,6 +298,15 @@ impl<P: Port> ProfileDrive<P> {
             // Where it does not, the motor shows it, unless somebody else has it: what that one lets it do, such as turn round, is not by the
             // word that was written.
             let is_others = status.control == Some(Control::Local);
+            if !is_others && std::mem::take(&mut was_others) {
+                // It was not taken meanwhile, and what comes down now still does so by whoever had it.
+                self.step(step.get_ref(), Class::Command, Order::Withdraw)
+                    .await
+                    .map_err(Error::after_write)?;
+                first = None;
+                continue;
+            }
+            was_others = is_others;
             let stands = !matches!(status.state, State::Running | State::Unknown);
             if is_gone.unwrap_or_else(|| !is_others && (stands || comes_down(&status, first))) {
                 self.watch.run.end();
