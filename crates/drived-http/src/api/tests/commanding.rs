@@ -194,7 +194,7 @@ async fn drives_that_are_selected_are_commanded_each_by_itself_and_no_other() {
         .wait_until(|seen| seen.status.as_ref().is_some_and(|seen| seen.value.state == State::Fault))
         .await;
     let three = json!(["pump 1", "pump 2", "pump 3", "pump 1"]);
-    let start = json!({"drives": three, "setpoint": {"frequency_hz": 30.0}});
+    let start = json!({"drives": three, "setpoint": {"frequency_hz": 30.0}, "expires_in_ms": 5_000});
     let (status, told) = command(&plant.plant, "/api/v1/selected/start?wait=30s", &start).await;
     // A group would have started nobody.
     assert_eq!(status, StatusCode::CONFLICT, "{told}");
