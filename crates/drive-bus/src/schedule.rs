@@ -370,7 +370,9 @@ impl<T> Schedule<T> {
         self.since_aged = count(aged_waits, aged, self.since_aged);
         self.since_background = count(background_waits, class == Class::Background, self.since_background);
         let slave = entry.slave;
-        let others_wait = self.queued.iter().any(|entry| asks_for_another(slave, entry));
+        // Asked of a Command alone: nothing else takes of its slave's share.
+        let others_wait =
+            class == Class::Command && self.queued.iter().any(|entry| asks_for_another(slave, entry));
         self.shares.count(now, class, slave, others_wait);
     }
 }

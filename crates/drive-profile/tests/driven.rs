@@ -57,6 +57,14 @@ async fn running(key: &str) -> Rig {
     rig
 }
 
+/// Its motor runs by its panel, behind a run command of the bus.
+async fn run_by_its_panel(key: &str) -> Rig {
+    let rig = running(key).await;
+    rig.machine.panel(drive_sim::Panel::TakeControl);
+    rig.machine.panel(drive_sim::Panel::Run);
+    rig
+}
+
 /// Whether a request only reads: functions 1 to 4.
 fn is_read(request: &drive_sim::Received) -> bool {
     matches!(request.pdu.first(), Some(1..=4))
@@ -221,9 +229,7 @@ async fn who_commands_is_told_only_where_the_drive_tells_it() {
 #[tokio::test(start_paused = true)]
 async fn a_panel_that_takes_control_is_told_where_the_drive_tells_it() {
     for (key, tells) in [("goodrive", true), ("v20", true), ("danfoss-fc", true), ("ig5a", false)] {
-        let mut rig = running(key).await;
-        rig.machine.panel(drive_sim::Panel::TakeControl);
-        rig.machine.panel(drive_sim::Panel::Run);
+        let mut rig = run_by_its_panel(key).await;
         let status = rig.drive.status().await.expect("it answers");
         let told = matches!(
             status.verdict,
@@ -237,9 +243,7 @@ async fn a_panel_that_takes_control_is_told_where_the_drive_tells_it() {
 #[tokio::test(start_paused = true)]
 async fn a_drive_that_answers_and_runs_by_its_panel_is_not_waited_for_as_one_that_is_on_its_way() {
     for key in ["goodrive", "v20", "danfoss-fc"] {
-        let mut rig = running(key).await;
-        rig.machine.panel(drive_sim::Panel::TakeControl);
-        rig.machine.panel(drive_sim::Panel::Run);
+        let mut rig = run_by_its_panel(key).await;
         let begun = tokio::time::Instant::now();
         let error = rig.drive.stop(StopMode::Ramp).await.expect_err("its panel runs it");
         assert_eq!(error.kind(), ErrorKind::NotConfirmed, "{key}: {error}");
@@ -250,9 +254,7 @@ async fn a_drive_that_answers_and_runs_by_its_panel_is_not_waited_for_as_one_tha
 /// Its run command does not read back, and its panel lets the motor come down, as it does too where it turns it round.
 #[tokio::test(start_paused = true)]
 async fn what_a_panel_lets_a_motor_do_shows_no_withdrawal() {
-    let mut rig = running("goodrive").await;
-    rig.machine.panel(drive_sim::Panel::TakeControl);
-    rig.machine.panel(drive_sim::Panel::Run);
+    let mut rig = run_by_its_panel("goodrive").await;
     rig.drive.status().await.expect("it answers");
     rig.machine.panel(drive_sim::Panel::Stop);
     let error = rig.drive.withdraw().await.expect_err("the panel has it");
@@ -266,9 +268,7 @@ async fn what_a_panel_lets_a_motor_do_shows_no_withdrawal() {
 /// The word was written while the panel had it, and it gives control back before that has shown.
 #[tokio::test(start_paused = true)]
 async fn a_withdrawal_that_was_written_to_a_panel_is_written_again_when_it_gives_control_back() {
-    let mut rig = running("goodrive").await;
-    rig.machine.panel(drive_sim::Panel::TakeControl);
-    rig.machine.panel(drive_sim::Panel::Run);
+    let mut rig = run_by_its_panel("goodrive").await;
     rig.drive.status().await.expect("it answers");
     rig.machine.panel(drive_sim::Panel::Reference(Frequency::from_hertz(5)));
     let back = async {

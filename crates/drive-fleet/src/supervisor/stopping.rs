@@ -358,11 +358,10 @@ impl Supervisor {
     /// What a new status says of a stop under way. Nothing is confirmed before the drive has taken it: a motor that stands for
     /// another reason may hold a run command.
     pub(super) fn judge_stop(&mut self, now: Instant) {
-        let Some(status) = self.status.clone() else { return };
+        let (Some(status), Some(stopping)) = (&self.status, &mut self.stopping) else { return };
         let (at, motion, output) = (status.at, status.value.motion, status.value.output_frequency);
         let standstill = self.settings.times.standstill;
         let (is_known, is_another) = (self.checks.stranger().is_none(), self.checks.is_another());
-        let Some(stopping) = &mut self.stopping else { return };
         if stopping.attempts == 0 {
             return;
         }
