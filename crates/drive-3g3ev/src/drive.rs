@@ -84,6 +84,7 @@ impl<P: Port> Drive for Drive3g3ev<P> {
     /// Writes 0001h without RUN and leaves the rest: if this value gave the run command, or bit A of 002Ch says that it is
     /// not in force.
     async fn withdraw(&mut self) -> Result<Withdrawn> {
+        self.registers.begin_order();
         self.withdraw_run().await
     }
 

@@ -96,6 +96,7 @@ impl<P: Port> Drive for Atv21<P> {
 
     /// Writes FA00 without RUN, and nothing else: if this value gave the run command, or FE45 says that it is not in force.
     async fn withdraw(&mut self) -> Result<Withdrawn> {
+        self.registers.begin_order();
         self.withdraw_run().await
     }
 
@@ -128,6 +129,7 @@ impl<P: Port> Drive for Atv21<P> {
     /// setpoint: CMOD and FMOD decide again. Refused when an input that is on would start the motor then, and when CMOD = 2,
     /// because the command stays with the bus then.
     async fn release(&mut self) -> Result<Status> {
+        self.registers.begin_order();
         self.give_control_back().await
     }
 

@@ -112,6 +112,7 @@ impl<P: Port> Drive for Atv28<P> {
     /// 100Fh, in forced local mode and where the bus commands: elsewhere a command would take the motor from whoever has it
     /// running.
     async fn withdraw(&mut self) -> Result<Withdrawn> {
+        self.registers.begin_order();
         drivecom::withdraw(self).await
     }
 

@@ -49,6 +49,7 @@ impl<P: Port> Atv312<P> {
     /// does not name the bus as its command source afterwards.
     pub async fn set_up_bus_control(&mut self) -> Result<Status> {
         const COMMAND: Command = Command::Configure("bus control set-up");
+        self.registers.begin_order();
         if let Some(reason) = self.refuses_writes() {
             return Err(self.refused(COMMAND, reason));
         }

@@ -77,6 +77,7 @@ impl<P: Port> Drive for Atv312<P> {
 
     /// 100Fh with the bits above it as the drive holds them, where bit 12 has its usual meaning.
     async fn withdraw(&mut self) -> Result<Withdrawn> {
+        self.registers.begin_order();
         self.read_settings(Class::Command).await?;
         drivecom::withdraw(self).await
     }
@@ -102,6 +103,7 @@ impl<P: Port> Drive for Atv312<P> {
     /// bus's even then, as of a drive that another program has set up, go to the terminals and to AI1; what else may have been
     /// set up there is left alone. `LFr` is set to zero. Refused while the terminals ask for a run that would start the motor.
     async fn release(&mut self) -> Result<Status> {
+        self.registers.begin_order();
         self.give_control_back().await
     }
 

@@ -96,6 +96,7 @@ impl<P: Port> Drive for Atv58<P> {
     /// 0000h to a drive that has left "operation enabled", such as a tripped one. For one that has not the manual names no word
     /// that ends a run command and nothing else.
     async fn withdraw(&mut self) -> Result<Withdrawn> {
+        self.registers.begin_order();
         drivecom::withdraw(self).await
     }
 

@@ -72,6 +72,7 @@ pub const ALL: &[Mutant] = &[
     ),
     mutant("stop-waits-its-turn", "a stop goes before everything"),
     mutant("stop-spares-commands", "a stop takes waiting commands with it"),
+    mutant("order-goes-on-behind-stop", "an order ends with a stop that comes on its way"),
     mutant("stop-dropped-with-its-caller", "a stop is sent whether its caller waits or not"),
     mutant("stop-dropped-offline", "a stop is sent to a slave that is off-line"),
     mutant("stop-waits-for-the-gateway", "a stop is sent whatever the far end owes"),

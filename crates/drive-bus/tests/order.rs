@@ -64,6 +64,45 @@ async fn a_stop_goes_before_everything_and_takes_waiting_commands_with_it() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn an_order_of_several_writes_ends_with_a_stop_that_was_written_to_its_slave() {
+    let (line, mut peer) = line(|config| config);
+    let order = || Terms { begun: Some(Instant::now()), ..Terms::of(Class::Command) };
+    let before = order();
+    tokio::time::sleep(MS).await;
+    let stop = writes(line.slave(1).with_terms(Terms::of(Class::Stop)), 8501, 0);
+    peer.answer(&[6, 0x21, 0x35, 0, 0]).await;
+    assert_eq!(stop.await.unwrap(), Ok(()));
+
+    assert_eq!(write(&mut line.slave(1).with_terms(before), 8501, 15).await, Err(PortError::Superseded));
+    assert_eq!(line.stats().slaves[&1].outcomes.superseded, 1);
+    tokio::time::sleep(MS).await;
+    let alone = Terms::of(Class::Command);
+    for (slave, terms) in [(2, before), (1, order()), (1, alone)] {
+        let goes_on = writes(line.slave(slave).with_terms(terms), 8501, 15);
+        assert_eq!(peer.answer(&[6, 0x21, 0x35, 0, 15]).await[0], slave);
+        assert_eq!(goes_on.await.unwrap(), Ok(()));
+    }
+    let read = reads(line.slave(1).with_terms(before), 8501, 1);
+    peer.answer(&[3, 2, 0, 15]).await;
+    assert_eq!(read.await.unwrap(), Ok(vec![15]));
+}
+
+#[tokio::test(start_paused = true)]
+async fn every_order_ends_with_a_stop_that_was_written_to_all() {
+    let (line, mut peer) = line(|config| config);
+    let before = Terms { begun: Some(Instant::now()), ..Terms::of(Class::Command) };
+    tokio::time::sleep(MS).await;
+    let stop = writes(line.slave(0).with_terms(Terms::of(Class::Stop)), 8501, 0);
+    peer.request().await;
+    assert_eq!(stop.await.unwrap(), Ok(()));
+    for slave in [1, 2] {
+        let outcome = write(&mut line.slave(slave).with_terms(before), 8501, 15).await;
+        assert_eq!(outcome, Err(PortError::Superseded));
+    }
+    peer.hears_nothing_for(1_000 * MS).await;
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_command_expires_in_the_queue_and_is_never_sent_late() {
     let (line, mut peer) = line(without_retries);
     let busy = reads(line.slave(9), 0, 1);

@@ -89,6 +89,8 @@ pub struct Registers<P> {
     elsewhere: Option<SlaveAddress>,
     /// When the oldest answer since [`begin_snapshot`](Self::begin_snapshot) ended on the line.
     oldest: Option<Instant>,
+    /// When the order began that is carried out.
+    begun: Option<Instant>,
     /// Until then what is read as a command judges an order that was written.
     judged_until: Option<Instant>,
     /// How long calls may wait.
@@ -120,6 +122,7 @@ impl<P: Port> Registers<P> {
             meaning,
             elsewhere,
             oldest: None,
+            begun: None,
             judged_until: None,
             lifetimes,
             kept,
@@ -138,15 +141,22 @@ impl<P: Port> Registers<P> {
         self.capabilities
     }
 
-    /// The calls that follow travel in this class, with its lifetime.
+    /// The calls that follow travel in this class, with its lifetime. Those of a stop end the order that had begun.
     pub const fn at(&mut self, class: Class) -> Calls<'_, P> {
-        let terms = Terms { lifetime: self.lifetimes.of(class), ..Terms::of(class) };
+        if matches!(class, Class::Stop) {
+            self.begun = None;
+        }
+        let begun = if matches!(class, Class::Command) { self.begun } else { None };
+        let terms = Terms { lifetime: self.lifetimes.of(class), begun, ..Terms::of(class) };
         Calls { registers: self, terms }
     }
 
-    /// An order begins: what is read for it dies with it, until it is written.
-    pub const fn begin_order(&mut self) {
+    /// An order begins: what is read for it dies with it, until it is written; and what it writes is not sent behind a stop of
+    /// somebody else's that comes meanwhile, see [`Terms::begun`]. **Whatever writes in the class of commands begins an order**, or it
+    /// is taken for a part of the one before.
+    pub fn begin_order(&mut self) {
         self.judged_until = None;
+        self.begun = Some(Instant::now());
     }
 
     /// The order is written, or may be, and its judgement is owed: **what judges it does not die of the order's lifetime**. What is

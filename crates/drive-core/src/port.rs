@@ -87,13 +87,17 @@ pub struct Terms {
     /// allows it. A line whose answers carry no number asks for more where the answer must differ from one that may
     /// still come, and leaves them out.
     pub spare_words: u8,
+    /// When the order began of which the call is a part: a start is several writes. A write in [`Class::Command`] is not sent
+    /// any more once a stop was written to its slave since, by whomever: it ends with [`PortError::Superseded`], so that nobody's
+    /// start goes on behind somebody else's stop. `None`: it is an order by itself.
+    pub begun: Option<Instant>,
 }
 
 impl Terms {
     /// The terms of a class, without a lifetime, for levels, replaced by nothing.
     #[must_use]
     pub const fn of(class: Class) -> Self {
-        Self { class, lifetime: None, effect: Effect::Level, replaces: None, spare_words: 0 }
+        Self { class, lifetime: None, effect: Effect::Level, replaces: None, spare_words: 0, begun: None }
     }
 
     /// These terms with a lifetime.
@@ -226,7 +230,7 @@ pub enum PortError {
     /// The lifetime ran out before the request was sent. Nothing was sent.
     #[error("expired before it was sent")]
     Expired,
-    /// A later call with the same key took its place. Nothing was sent.
+    /// A later call with the same key took its place, or a stop. Nothing was sent.
     #[error("superseded by a later call before it was sent")]
     Superseded,
     /// The slave has not answered for several requests; the line asks it again by itself. Nothing was sent.

@@ -28,14 +28,17 @@ impl<C> Master<C> {
         caller: C,
     ) -> Result<Ticket, PortError> {
         let request = Arc::new(request);
-        let pdu = self.admit(now, slave, &request, terms).inspect_err(|_| {
+        let pdu = self.admit(now, slave, &request, terms).inspect_err(|error| {
             if let Some(station) = self.stations.get_mut(&slave) {
-                station.stats.outcomes.refused += 1;
+                station.stats.outcomes.never_sent(error);
             }
         })?;
         let is_write = self.exchange.is_write(&request);
         if terms.class == Class::Stop {
             self.clear_the_way(now, slave);
+            if is_write {
+                self.station(slave).stopped = Some(now);
+            }
         }
         let shape = self.exchange.shape(&pdu);
         let asked = Asked {
@@ -94,6 +97,10 @@ impl<C> Master<C> {
         }
         let is_write = self.exchange.is_write(request);
         self.station(slave).ask(now, request, is_write);
+        let is_over = terms.class == Class::Command && is_write && self.is_stopped_since(slave, terms.begun);
+        if crate::mutant!("order-goes-on-behind-stop", is_over, false) {
+            return Err(PortError::Superseded);
+        }
         if terms.class != Class::Stop
             && let Some(at) = self.probe_at(slave)
         {

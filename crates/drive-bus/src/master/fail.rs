@@ -50,9 +50,7 @@ impl<C> Master<C> {
         // A command sent again behind a stop would undo it.
         let stopped = entry.work.is_write
             && entry.terms.class != Class::Stop
-            && self.schedule.any(|other| {
-                other.terms.class == Class::Stop && (other.slave == 0 || other.slave == entry.slave)
-            });
+            && self.is_stopped_since(entry.slave, Some(entry.arrived));
         // A later request with the same key says that this value is not wanted any more.
         let replaced = entry.terms.replaces.is_some()
             && self
@@ -114,12 +112,7 @@ impl<C> Master<C> {
 
     /// A request leaves the queue. What was sent before, and waited to be sent again, ends as that attempt did.
     pub(super) fn drop_unsent(&mut self, entry: Entry<Asked<C>>, error: PortError) {
-        let outcomes = &mut self.station(entry.slave).stats.outcomes;
-        match error {
-            PortError::Expired => outcomes.expired += 1,
-            PortError::Superseded => outcomes.superseded += 1,
-            _ => outcomes.refused += 1,
-        }
+        self.station(entry.slave).stats.outcomes.never_sent(&error);
         let error = crate::mutant!("sent-told-as-unsent", entry.work.last.unwrap_or(error), error);
         self.outcomes.push_back((entry.work.caller, Err(error)));
     }

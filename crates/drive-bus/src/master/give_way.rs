@@ -30,6 +30,13 @@ impl<C> Master<C> {
         self.offline.probe_again(now, flight.slave);
     }
 
+    /// Whether a stop was written to a slave, or to all, since an order began.
+    pub(super) fn is_stopped_since(&self, slave: u8, begun: Option<Instant>) -> bool {
+        let stopped = |slave| self.stations.get(&slave).and_then(|station| station.stopped);
+        let since = begun.zip(stopped(slave).max(stopped(0)));
+        since.is_some_and(|(begun, stopped)| stopped >= begun)
+    }
+
     /// The exchange that was under way is given up for a stop.
     pub(super) fn break_off(&mut self, now: Instant, flight: &Flight<C>) {
         self.exchange.abandon();

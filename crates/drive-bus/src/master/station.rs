@@ -41,6 +41,8 @@ pub(super) struct Station {
     pub(super) retracted: Option<Instant>,
     /// When the last question began that it has answered.
     pub(super) answered_at: Option<Instant>,
+    /// When the write of a stop came for it last.
+    pub(super) stopped: Option<Instant>,
     failures: u32,
     /// It was heard when its time was over.
     slow: bool,
@@ -61,6 +63,7 @@ impl Station {
             row: Row::default(),
             retracted: None,
             answered_at: None,
+            stopped: None,
             failures: 0,
             slow: false,
             last_read: None,

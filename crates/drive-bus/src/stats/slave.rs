@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use drive_core::PortError;
+
 #[cfg(feature = "unitelway")]
 use drive_unitelway::LinkCounters;
 
@@ -28,12 +30,23 @@ pub struct Outcomes {
     pub busy: u64,
     /// Expired in the queue.
     pub expired: u64,
-    /// Replaced in the queue by a later request.
+    /// Replaced by a later request, in the queue or by a stop that came since its order began.
     pub superseded: u64,
     /// Withdrawn by a caller that did not wait.
     pub withdrawn: u64,
     /// Refused at once: slave off-line, queue full, line down or closed.
     pub refused: u64,
+}
+
+impl Outcomes {
+    /// One that was never sent, and why.
+    pub(crate) const fn never_sent(&mut self, error: &PortError) {
+        match error {
+            PortError::Expired => self.expired += 1,
+            PortError::Superseded => self.superseded += 1,
+            _ => self.refused += 1,
+        }
+    }
 }
 
 /// What the line knows of one slave.
