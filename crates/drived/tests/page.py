@@ -208,9 +208,33 @@ def proxy(page, url):
     # One that the daemon never saw is not known, and neither done nor refused.
     page.unroute("**/start?*")
     page.route("**/setpoint?*", in_between)
-    page.locator(".setpoint input[type=number]").fill("20")
+    page.locator(".setpoint input[type=text]").fill("20")
     page.locator(".setpoint button").click()
     expect(page.locator(".latest li").first).to_contain_text("not known: the daemon has no record of it")
+
+
+def typed(page, url):
+    """A setpoint is given as it was written, by the point or the comma of any language, and what is no number is not given."""
+    page.goto(url)
+    page.locator(".rows .row:not([data-trouble])", has_not_text="only read").first.locator("a").click()
+    field, give = page.locator(".setpoint .pair input"), page.locator(".setpoint button")
+    for text, hertz in [("0.5", 0.5), ("2,5", 2.5), ("37.5", 37.5), ("12,25", 12.25), (" 20 ", 20)]:
+        field.press("Control+a")
+        field.press_sequentially(text, delay=20)
+        expect(field).to_have_value(text)
+        with page.expect_request("**/setpoint?*") as sent:
+            field.press("Enter")
+        assert sent.value.post_data_json["setpoint"] == {"frequency_hz": hertz}, (text, sent.value.post_data)
+    for text in ["2,5 Hz", "1.2.3", "-5", "1e1", "37.", "99.9", "x", ""]:
+        field.fill(text)
+        expect(give).to_be_disabled()
+    field.fill("2;5")
+    expect(page.locator(".setpoint .hint")).to_contain_text("A number is wanted here")
+    # The slider and the field tell the same.
+    page.locator(".setpoint input[type=range]").fill("31.5")
+    expect(field).to_have_value("31.5")
+    field.fill("8,5")
+    expect(page.locator(".setpoint input[type=range]")).to_have_value("8.5")
 
 
 def bare(page, url):
@@ -1198,7 +1222,7 @@ SCENES = {
     "zones": (zones, DESK | {"timezone_id": "Pacific/Kiritimati"}), "touched": (touched, PHONE | {"is_mobile": False}),
     "loads": (loads, DESK), "trip": (trip, DESK), "stop_all": (stop_all, DESK), "phone": (phone, PHONE),
     "phone_french": (phone, PHONE | {"locale": "fr-FR"}),
-    "french": (french, PHONE | {"locale": "fr-FR"}), "cable": (cable, DESK), "away": (away, DESK), "many": (many, DESK), "hung": (hung, DESK), "proxy": (proxy, DESK), "bare": (bare, DESK),
+    "french": (french, PHONE | {"locale": "fr-FR"}), "cable": (cable, DESK), "away": (away, DESK), "many": (many, DESK), "hung": (hung, DESK), "proxy": (proxy, DESK), "typed": (typed, DESK), "bare": (bare, DESK),
     "tabs": (tabs, DESK), "questions": (questions, PHONE), "long_group": (long_group, PHONE), "dead": (dead, DESK),
     "scoped": (scoped, DESK), "unread": (unread, DESK), "restarted": (restarted, DESK), "encrypted": (encrypted, DESK), "clocks": (clocks, DESK), "axe": (axe, DESK | {"bypass_csp": True}),
     "axe_dark": (axe, PHONE | {"bypass_csp": True, "color_scheme": "dark", "locale": "fr-FR"}),

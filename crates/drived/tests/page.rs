@@ -10,14 +10,10 @@ use std::{
     net::TcpListener,
     path::{Path, PathBuf},
     process::{Command, Stdio},
-    sync::{Mutex, PoisonError},
 };
 
 use drive_testing::peers;
 use support::{File, Running, Sim, ask, path, run};
-
-/// One browser at a time is enough for a machine with two processors.
-static ONE_BY_ONE: Mutex<()> = Mutex::new(());
 
 #[test]
 fn the_page_of_the_demo_loads_and_no_view_complains_in_the_console() {
@@ -63,6 +59,11 @@ fn a_stop_that_a_network_swallows_is_said_to_be_unknown_and_sent_again() {
 #[test]
 fn what_a_proxy_answers_is_not_known_and_the_command_is_found_by_its_id() {
     look_at_the_demo("proxy");
+}
+
+#[test]
+fn a_setpoint_is_given_as_it_was_written_with_a_point_or_a_comma() {
+    look_at_the_demo("typed");
 }
 
 #[test]
@@ -289,7 +290,6 @@ fn look_with(
     told: impl FnOnce() -> Vec<String>,
     mut drives: Option<&mut Sim>,
 ) {
-    let _alone = ONE_BY_ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let port =
         TcpListener::bind("127.0.0.1:0").expect("a port is free").local_addr().expect("it has one").port();
     let address = format!("127.0.0.1:{port}");

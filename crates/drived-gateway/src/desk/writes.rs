@@ -148,14 +148,11 @@ impl Desk {
         Some(family.open_with(line.slave(drive.slave().number()), drive.slave(), &options))
     }
 
-    /// Whether the word of a broadcast stops every drive of this gateway; the mode is that of the first.
+    /// Whether the words of a broadcast stop the drives of this gateway.
     fn broadcast_stop(&self, ask: &Ask) -> Option<Stop> {
-        let modes = self.drives().into_iter().map(|drive| {
-            let mut intents = self.intents_without_reading(&drive, ask);
-            intents.find_map(Intent::stops)
-        });
-        let modes: Option<Vec<StopMode>> = modes.collect();
-        modes?.first().copied().map(Stop)
+        let drives = self.drives();
+        let intents = drives.iter().flat_map(|drive| self.intents_without_reading(drive, ask));
+        stop_of_all(intents).map(Stop)
     }
 
     /// Stops a motor. Confirmed when the drive shows that no run command is in force any more; it may still come down.
@@ -536,4 +533,33 @@ fn stands(drive: &DriveHandle) -> bool {
 fn shows_fault(drive: &DriveHandle) -> bool {
     let snapshot = drive.snapshot();
     snapshot.fresh_status(Instant::now()).is_some_and(drive_core::Status::is_fault)
+}
+
+/// How the words stop all, if they do, by what they ask of each drive that understands them: whoever speaks of one family to all means
+/// all of them, so that they do when they stop any and start none. The mode is that of the first.
+fn stop_of_all(intents: impl Iterator<Item = Intent>) -> Option<StopMode> {
+    let mut first = None;
+    for intent in intents {
+        match intent {
+            Intent::Start(_) => return None,
+            other => first = first.or(other.stops()),
+        }
+    }
+    first
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_core::Direction;
+
+    use super::*;
+
+    #[test]
+    fn words_for_one_family_stop_every_drive_of_a_gateway_that_none_of_them_starts() {
+        let stop = Intent::Stop(StopMode::Freewheel);
+        assert_eq!(stop_of_all([].into_iter()), None, "nobody understands it");
+        assert_eq!(stop_of_all([stop, stop].into_iter()), Some(StopMode::Freewheel));
+        assert_eq!(stop_of_all([Intent::Start(Direction::Forward), stop].into_iter()), None);
+        assert_eq!(stop_of_all([stop, Intent::Start(Direction::Reverse)].into_iter()), None);
+    }
 }

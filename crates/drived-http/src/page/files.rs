@@ -67,6 +67,7 @@ files![
     "ask.js",
     "attention.js",
     "curves.js",
+    "decimal.js",
     "demo.js",
     "dom.js",
     "fold.js",

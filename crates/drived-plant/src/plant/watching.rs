@@ -114,8 +114,16 @@ async fn changes(plant: Weak<Inner>, line: Arc<str>, drive: DriveHandle) {
         });
         if is_new {
             let Some(plant) = plant.upgrade() else { return };
+            let is_there = || plant.fleet.drive(drive.name()).is_some();
+            if !is_there() {
+                return;
+            }
             plant.revisions.push(Subject::Drive, &plant.view_of(&line, &drive));
             told = Some((known, now));
+            // It went between the two, and whoever has read the state by now would show it as it was for ever.
+            if !is_there() {
+                return plant.revisions.begin_anew();
+            }
         }
         sleep_until(now + TOGETHER).await;
         // The status is stale a moment after its age has been reached.

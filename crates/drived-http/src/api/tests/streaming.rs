@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use drive_core::StopMode;
+use drived_plant::plant::revisions::{Next, Subject, data_of};
 use serde_json::json;
+use tokio::time::timeout;
 
 use super::*;
 
@@ -123,6 +125,33 @@ async fn a_value_that_grows_old_is_told_without_being_asked() {
     );
     plant.line.join();
     stream.find("drive", |drive| drive["status"]["quality"] == "good").await;
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_has_gone_is_told_to_nobody_who_has_read_the_state_since() {
+    for after in (0..100).step_by(5) {
+        let plant = TestPlant::of(1).await;
+        let body = json!({"setpoint": {"frequency_hz": 30.0}});
+        command(&plant.plant, "/api/v1/drives/pump%201/start", &body).await;
+        tokio::time::sleep(Duration::from_millis(300 + after)).await;
+        let (fleet, revisions) = (plant.plant.fleet(), plant.plant.revisions());
+        let mut reader = revisions.reader(None);
+        let gone = fleet.remove(&["pump 1"], Duration::from_secs(20)).await;
+        assert_eq!(gone.len(), 1);
+        revisions.begin_anew();
+
+        let mut is_shown = true;
+        while let Ok(next) = timeout(Duration::from_secs(5), revisions.next(&mut reader)).await {
+            is_shown = match next {
+                Next::Reset(_) => false,
+                Next::Frames(frames) => {
+                    is_shown || frames.iter().any(|frame| data_of(frame, Subject::Drive).is_some())
+                }
+                Next::End => break,
+            };
+        }
+        assert!(!is_shown, "{after} ms");
+    }
 }
 
 #[tokio::test(start_paused = true)]

@@ -94,12 +94,13 @@ export function mayCommand({ name, commanders }) {
   return Boolean(rights.operate) && (!scope || scope.includes(name)) && (!commanders || commanders.includes(caller));
 }
 
-/** A fresh `DRIVE` that came another way than by the events. */
+/** A fresh `DRIVE`, by the events or another way. Who is there the state alone says: one that has gone is not shown again by what was on its way. */
 export function takeDrive(drive) {
-  drive.receivedAt = performance.now();
   const before = plant.drives.get(drive.name);
-  const isSame = before && before.status?.state === drive.status?.state;
-  drive.changedAt = isSame ? before.changedAt : before && drive.receivedAt;
+  if (!before) return;
+  drive.receivedAt = performance.now();
+  const isSame = before.status?.state === drive.status?.state;
+  drive.changedAt = isSame ? before.changedAt : drive.receivedAt;
   plant.drives.set(drive.name, drive);
   tell(`drive ${drive.name}`);
 }

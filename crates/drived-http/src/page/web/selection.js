@@ -1,6 +1,7 @@
 // The drives that somebody has chosen, and what he may do with all of them at once: each command says first for how many it is.
 
 import { confirmed } from './ask.js';
+import { decimalField, read } from './decimal.js';
 import { el, setText } from './dom.js';
 import { quantity } from './format.js';
 import { command } from './orders.js';
@@ -9,7 +10,6 @@ import { shown as shownOf, shownToStop, withSetpoints } from './shown.js';
 import { t } from './texts.js';
 
 const NAMED = 12;
-const STEP_HZ = 0.1;
 
 /** For which drives each command is one that is not refused. */
 const FITS = {
@@ -91,11 +91,11 @@ export function selectionBar(chosen, changed) {
     const all = fitting('setpoint');
     const expects = shownOf(all);
     const [low, high] = limitsOf(all);
-    const field = el('input', { type: 'number', step: STEP_HZ, min: low, max: high, required: true, inputmode: 'decimal' });
     const said = t('limits_are', { low: quantity(low, 1), high: quantity(high, 1, 'Hz') });
+    const field = decimalField({ required: true }, hertz => hertz < low || hertz > high ? said : '');
     const label = el('label.field', {}, `${t('setpoint')} (Hz). ${said}`, field);
     if (!await confirmed(expects, question('confirm_setpoint_these', all), t('set'), { field: label })) return;
-    give('setpoint', all, { setpoint: { frequency_hz: Number(field.value) }, expects });
+    give('setpoint', all, { setpoint: { frequency_hz: read(field) }, expects });
   }
 
   /** Who is commanded, and who of the chosen is not. */

@@ -1,5 +1,6 @@
 // The control of a setpoint, with the drive's limits and forbidden bands drawn into it.
 
+import { decimalField, read, write } from './decimal.js';
 import { el, setAttribute, setText } from './dom.js';
 import { quantity } from './format.js';
 import { t } from './texts.js';
@@ -11,7 +12,7 @@ const STEP_HZ = 0.1;
 /** A control that calls `send(hertz)`: `element`, `update(drive)`. */
 export function setpointControl(send) {
   const slider = el('input', { type: 'range', step: STEP_HZ, 'aria-label': t('setpoint') });
-  const field = el('input', { type: 'number', step: STEP_HZ, inputmode: 'decimal', 'aria-label': `${t('setpoint')} (Hz)` });
+  const field = decimalField({ 'aria-label': `${t('setpoint')} (Hz)` });
   const bands = el('div.bands', { 'aria-hidden': 'true' });
   const said = el('p.hint', { 'aria-live': 'polite' });
   const give = el('button', {}, t('set'));
@@ -22,22 +23,22 @@ export function setpointControl(send) {
   let touched = false;
   let drawn = '';
 
-  slider.addEventListener('input', () => choose(slider.value));
-  field.addEventListener('input', () => choose(field.value));
+  slider.addEventListener('input', () => choose(() => write(field, slider.value)));
+  // What is written is left as it is: whoever writes it has not come to its end.
+  field.addEventListener('input', () => choose(() => { slider.value = read(field) ?? slider.value; }));
   return { element, update };
 
   function update(drive) {
     limits = { low: drive.limits?.low_hz ?? 0, high: drive.limits?.high_hz ?? USUAL_HIGH_HZ, forbidden: drive.limits?.forbidden_hz ?? [] };
     readOnly = drive.control === false;
-    for (const input of [slider, field]) {
-      setAttribute(input, 'min', limits.low);
-      setAttribute(input, 'max', limits.high);
-      input.disabled = readOnly;
-    }
+    setAttribute(slider, 'min', limits.low);
+    setAttribute(slider, 'max', limits.high);
+    slider.disabled = field.disabled = readOnly;
     // Nobody's choice is pulled from under his finger by what the drive reports.
     if (!touched) {
-      field.value = String(setpointOf(drive)?.frequency_hz ?? '');
-      slider.value = field.value || limits.low;
+      const held = setpointOf(drive)?.frequency_hz;
+      write(field, held);
+      slider.value = held ?? limits.low;
     }
     draw(drive);
     judge();
@@ -61,26 +62,27 @@ export function setpointControl(send) {
     return mark;
   }
 
-  function choose(text) {
+  function choose(follow) {
     touched = true;
-    slider.value = field.value = text;
+    follow();
     judge();
   }
 
   function judge() {
-    const value = Number(field.value);
+    const value = read(field);
+    const isNone = value === undefined && field.value.trim() !== '';
     const band = limits.forbidden.find(([from, to]) => value > from && value < to);
     const range = ([from, to]) => `${quantity(from, 1)}–${quantity(to, 1, 'Hz')}`;
-    give.disabled = readOnly || field.value === '' || Boolean(band) || value < limits.low || value > limits.high;
-    setText(said, [band ? t('forbidden_now', { value: quantity(value, 1, 'Hz') }) : t('limits_are', { low: quantity(limits.low, 1), high: quantity(limits.high, 1, 'Hz') }),
+    give.disabled = readOnly || value === undefined || Boolean(band) || value < limits.low || value > limits.high;
+    setText(said, [isNone ? t('no_number') : band ? t('forbidden_now', { value: quantity(value, 1, 'Hz') }) : t('limits_are', { low: quantity(limits.low, 1), high: quantity(limits.high, 1, 'Hz') }),
       limits.forbidden.length ? t('forbidden_are', { bands: limits.forbidden.map(range).join(', ') }) : ''].filter(Boolean).join('. '));
-    said.classList.toggle('bad', Boolean(band));
+    said.classList.toggle('bad', isNone || Boolean(band));
   }
 
   function submit(event) {
     event.preventDefault();
     if (give.disabled) return;
     touched = false;
-    send(Number(field.value));
+    send(read(field));
   }
 }

@@ -193,6 +193,7 @@ const TABLE = {
   release: ['Give control back', 'Rendre la main'],
   set: ['Set', 'Appliquer'],
   set_setpoint: ['Set the setpoint', 'Régler la consigne'],
+  no_number: ['A number is wanted here, such as 37.5.', 'Un nombre est attendu ici, par exemple 37,5.'],
   limits_are: ['Limits {low} to {high}', 'Limites de {low} à {high}'],
   forbidden_are: ['Forbidden: {bands}', 'Bandes interdites : {bands}'],
   forbidden_now: ['{value} is forbidden here.', '{value} est interdit ici.'],
