@@ -29,7 +29,7 @@ macro_rules! mutant {
 }
 
 #[cfg(feature = "mutants")]
-pub use chosen::{Chosen, choose, is, was_reached};
+pub use chosen::{Chosen, choose, is, was_reached, went_on_for_ever};
 
 /// A mutant: its name, and the promise that it breaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -129,7 +129,11 @@ mod chosen {
         if chosen {
             REACHED.with_borrow_mut(|reached| reached.insert(name));
             TIMES.set(TIMES.get() + 1);
-            assert!(TIMES.get() < WITHOUT_END, "the line of {name} is reached without end");
+            if TIMES.get() >= WITHOUT_END {
+                // Once: whoever goes on behind a panic, as a fleet does, would go on without end.
+                CHOSEN.set(None);
+                panic!("the line of {name} is reached without end");
+            }
         }
         chosen
     }
@@ -138,6 +142,12 @@ mod chosen {
     #[must_use]
     pub fn was_reached(name: &str) -> bool {
         REACHED.with_borrow(|reached| reached.contains(name))
+    }
+
+    /// Whether the line of the one that was chosen last was reached without end.
+    #[must_use]
+    pub fn went_on_for_ever() -> bool {
+        TIMES.get() >= WITHOUT_END
     }
 
     /// A mutant is chosen on this thread for as long as this lives.

@@ -252,7 +252,9 @@ fn find_plants_of(
                 let _chosen = drive_bus::mutants::choose(name);
                 let held = target.execute(number);
                 was_reached |= drive_bus::mutants::was_reached(name);
-                held
+                // A fleet goes on behind a panic.
+                let ends = !drive_bus::mutants::went_on_for_ever();
+                held.and_then(|()| ends.then_some(()).ok_or_else(|| "it goes on without end".to_owned()))
             };
             let Err(why) = held else { continue };
             // A plant is found by an order that is sound without it.
