@@ -69,6 +69,27 @@ async fn a_stop_that_another_master_undoes_ends_in_its_time_and_is_an_alarm_unle
     }
 }
 
+/// Altivar 21 Modbus §8.3 p. 24 leaves open whether bit 10 of FD01 ends with the order or with the motion, and the factory's ramp is 10 s.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_comes_down_for_longer_than_its_time_is_stopped_whatever_its_drive_calls_running() {
+    for reading in ["ordered", "turning"] {
+        for dec in [100, 600] {
+            let change = |settings: &mut DriveSettings| settings.times.standstill = STANDSTILL;
+            let mut plant = Plant::single(Family::ATV21, change);
+            plant.happens(&format!("reading FD01.10 {reading}"));
+            plant.happens(&format!("set DEC {dec}"));
+            plant.run_at(40).await;
+            plant.events_so_far().await;
+            let outcome = plant.motor().stop(StopMode::Ramp).await;
+            assert!(outcome.is_confirmed(), "{reading}, DEC {dec}: {outcome}");
+            assert_eq!(plant.machine().observe().shaft_frequency, 0, "{reading}, DEC {dec}");
+            let events = plant.events_so_far().await;
+            let is_alarm = |kind: &EventKind| matches!(kind, EventKind::StopUnconfirmed { .. });
+            assert!(!events.iter().any(is_alarm), "{reading}, DEC {dec}: {events:?}");
+        }
+    }
+}
+
 /// A driver that forgets to write: it reads, and says that it is done.
 struct Forgetful {
     inner: Box<dyn Drive>,

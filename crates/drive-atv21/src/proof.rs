@@ -9,14 +9,14 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Evidence, Frequency, Ground, Output, Port, RawWord, Refusal, Status, Told, Verdict,
+    Class, Evidence, Frequency, Ground, Output, Port, RawWord, Refusal, State, Status, Told, Verdict,
     registers::{Register, access::ReadWrite},
 };
 use tokio::time::Instant;
 
 use crate::{
     Atv21,
-    control::{DECIDE, commanded_by_other, not_in_force, source, status_word},
+    control::{DECIDE, commanded_by_other, is_falling, not_in_force, source, status_word},
     in_effect::ReadBlock,
     refusals::{OTHER_REFERENCE, ST_OFF},
     registers as map,
@@ -80,6 +80,7 @@ pub(crate) struct Proof {
     /// What stands for it now: FE02 for FA01, FA13 for itself.
     pub(crate) reference: Option<u16>,
     approach: Approach,
+    descent: Descent,
     /// How many of FE46 and FE02 are to be looked at whatever was paid.
     urgent: usize,
 }
@@ -136,6 +137,28 @@ impl Approach {
     }
 }
 
+/// Without a lower output for so long a motor is not coming down: the longest ramp that the drive has lowers FD00 twice in it.
+const SINKS: Duration = Duration::from_secs(1);
+
+/// Whether the output sinks, from look to look.
+#[derive(Debug, Clone, Copy, Default)]
+struct Descent {
+    last: Option<Frequency>,
+    sank: Option<Instant>,
+}
+
+impl Descent {
+    fn see(&mut self, now: Instant, output: Option<Frequency>) -> bool {
+        if is_falling(self.last, output) {
+            self.sank = Some(now);
+        } else if is_falling(output, self.last) {
+            self.sank = None;
+        }
+        self.last = output;
+        self.sank.is_some_and(|sank| now.saturating_duration_since(sank) < SINKS)
+    }
+}
+
 /// What FD01 says of the output, for the shaft.
 fn output(word: StatusWord, frequency: Option<Frequency>, was_braked: bool) -> Output {
     let cut = StatusWord::FREEWHEEL | StatusWord::UNDERVOLTAGE | StatusWord::EMERGENCY_STOP;
@@ -179,9 +202,22 @@ pub(crate) fn withheld(word: StatusWord) -> Option<Refusal> {
 impl<P: Port> Atv21<P> {
     /// What a reading of the fast set says of the shaft and of the run command.
     pub(crate) fn tell(&mut self, status: &mut Status) {
-        let was_braked = self.watch.shaft.was_braked();
-        let shown = output(status_word(status), status.output_frequency, was_braked);
-        status.motion = self.watch.see(Instant::now(), shown, status.output_frequency);
+        let (now, was_braked) = (Instant::now(), self.watch.shaft.was_braked());
+        let mut shown = output(status_word(status), status.output_frequency, was_braked);
+        let sinks = self.proof.descent.see(now, status.output_frequency);
+        // Whether "run" in FD01 ends with the order or with the motion the manual leaves open.
+        let is_withdrawn = self.held.is_some_and(|held| !held.contains(CommandWord::RUN));
+        if let (Output::Driven, Some(frequency)) = (shown, status.output_frequency)
+            && sinks
+            && is_withdrawn
+            && commanded_by_other(status).is_none()
+        {
+            shown = Output::Braking(frequency);
+            if status.state == State::Running {
+                status.state = State::Stopping;
+            }
+        }
+        status.motion = self.watch.see(now, shown, status.output_frequency);
         status.verdict = self.verdict(status);
     }
 
