@@ -53,6 +53,12 @@ impl Feeding {
         Some(*self.0.iter().find(soon).unwrap_or(anybody))
     }
 
+    /// Who is to be asked first of those at these settings, and when.
+    pub(super) fn first_at(&self, trial: usize) -> Option<(Fed, Duration)> {
+        let there = self.0.iter().filter(|fed| fed.step.trial == trial);
+        there.min_by_key(|fed| fed.due).map(|fed| (*fed, fed.due))
+    }
+
     /// Whether it is among them.
     pub(super) fn has(&self, step: Step) -> bool {
         self.0.iter().any(|fed| fed.step == step)

@@ -1,13 +1,13 @@
 //! The task that asks: each step of a plan in its order, and whom it has found again and again, each at his own settings.
 
-use std::time::Duration;
+use std::{pin::pin, time::Duration};
 
 use drive_bus::{
     Line, LineConfig, SlaveSettings,
     evidence::{Defect, Finding},
 };
 use drive_families::Family;
-use tokio::time::Instant;
+use tokio::time::{Instant, sleep_until};
 
 use super::{
     answer::{Answer, Likeness},
@@ -166,7 +166,8 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
     async fn ask(&mut self, step: Step) -> Result<Option<Find>, Failure> {
         let line = self.fed_line(step).await?;
         let before = look::unasked(&line);
-        let heard = look::ask(self.look_at(&line, step), self.wait).await?;
+        let look = look::ask(self.look_at(&line, step), self.wait);
+        let heard = self.fed_meanwhile(&line, step.trial, look).await?;
         let silent = std::mem::replace(&mut self.silent, Some(step).filter(|_| heard == Heard::Nothing));
         let silent = silent.filter(|silent| silent.trial == step.trial);
         self.note_disturbing(silent, &line, before);
@@ -216,7 +217,8 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
             if line_spec::check(&config, &[DriveName { family, slave: step.slave }]).is_err() {
                 continue;
             }
-            let looks = look::status(self.look_at(&line, step), family).await;
+            let look = look::status(self.look_at(&line, step), family);
+            let looks = self.fed_meanwhile(&line, step.trial, look).await;
             longest = longest.max(look::longest_read(&line, step.slave));
             match looks {
                 Looks::Like(()) => {}
@@ -227,7 +229,8 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
                 }
             }
             let line = self.line_fed_for(step, LOOK).await?;
-            match look::identity(self.look_at(&line, step), family).await {
+            let look = look::identity(self.look_at(&line, step), family);
+            match self.fed_meanwhile(&line, step.trial, look).await {
                 Looks::Like((likeness, watchdog)) => {
                     intervals.push((family, interval(family, config.protocol.is_ascii(), watchdog)));
                     alike.push(likeness);
@@ -236,7 +239,8 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
                 Looks::Damaged => is_damaged = true,
             }
             let line = self.line_fed_for(step, LOOK).await?;
-            is_damaged |= look::measurements(self.look_at(&line, step), family).await == Looks::Damaged;
+            let look = look::measurements(self.look_at(&line, step), family);
+            is_damaged |= self.fed_meanwhile(&line, step.trial, look).await == Looks::Damaged;
         }
         let named = alike.iter().any(|likeness| likeness.certain);
         alike.retain(|likeness| match named {
@@ -294,6 +298,32 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
             self.feeding.fed(fed.step, self.began.elapsed());
         }
         self.line(step.trial).await
+    }
+
+    /// Looks, and feeds those at the same settings between any two questions of it, however many it has.
+    async fn fed_meanwhile<T>(&mut self, line: &Line, trial: usize, look: impl Future<Output = T>) -> T {
+        let mut look = pin!(look);
+        while let Some((fed, due)) = self.feeding.first_at(trial) {
+            tokio::select! {
+                biased;
+                seen = &mut look => return seen,
+                () = sleep_until(self.began + due) => {}
+            }
+            let mut feed = pin!(look::feed(line, fed.family, fed.step.slave));
+            let seen = tokio::select! {
+                biased;
+                () = &mut feed => None,
+                seen = &mut look => Some(seen),
+            };
+            if seen.is_some() {
+                feed.await;
+            }
+            self.feeding.fed(fed.step, self.began.elapsed());
+            if let Some(seen) = seen {
+                return seen;
+            }
+        }
+        look.await
     }
 
     /// The line at the settings of a trial.

@@ -260,3 +260,23 @@ async fn a_drive_whose_watchdog_is_armed_does_not_trip_while_the_scan_goes_on() 
     assert!([&drive, &other].into_iter().all(|machine| machine.observe().trip.is_some()));
     assert_only_read(&[drive, other]);
 }
+
+/// BBV51701 p. 17: `ttO` is set from 0.1 s on.
+#[tokio::test(start_paused = true)]
+async fn a_short_watchdog_is_fed_between_the_questions_to_another_slave_and_during_a_silence() {
+    for tto in [5, 3] {
+        let simulated = SimLine::default();
+        let drive =
+            simulated.add_boxed(3, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap();
+        let rows = Family::ATV312.capabilities().rows;
+        let address = rows.iter().find(|row| row.code == "ttO").unwrap().address;
+        assert!(drive.poke(address, tto));
+        // It is asked more than any other, and does not tell its name.
+        simulated.add_boxed(8, simulated::model(Family::ATV21, SetUp::Factory).unwrap()).unwrap();
+        let finds = scanned(&simulated, &at_one("19200 8E1", 1..=20)).await;
+        assert_eq!(finds.len(), 2);
+        assert_eq!(drive.observe().trip, None, "{} ms", tto * 100);
+        tokio::time::sleep(Duration::from_secs(2)).await;
+        assert!(drive.observe().trip.is_some(), "it was armed");
+    }
+}
