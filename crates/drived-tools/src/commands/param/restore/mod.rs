@@ -207,6 +207,15 @@ async fn restore(
         text.push(format!("{name}: {differ} from {}", path.display()));
         text.push(plan.table(file, &now).on_terminal().to_string());
     }
+    if !plan.not_in_file.is_empty() {
+        let codes: Vec<_> = plan.not_in_file.iter().map(|row| row.code).collect();
+        let named = output::counted(codes.len(), "setting that it has is", "settings that it has are");
+        text.push(format!(
+            "{name}: {named} not in {}, which was cut off or has chosen ones, and left as found: {}",
+            path.display(),
+            codes.join(", ")
+        ));
+    }
     json.insert("other_model".to_owned(), json!(other));
     json.insert("other_firmware".to_owned(), json!(firmware));
     text.extend(other.map(|why| format!("another model: {why}")));

@@ -21,6 +21,8 @@ pub(super) struct Plan {
     pub(super) skipped: Vec<(&'static Row, String)>,
     /// Of those the ones that nobody has left out: what the drive holds there is not known to be what the file has.
     pub(super) missing: Vec<&'static Row>,
+    /// Settings of the drive that the file does not name: it was cut off, or has chosen ones.
+    pub(super) not_in_file: Vec<&'static Row>,
     /// What the drive holds now.
     pub(super) way: Way,
 }
@@ -85,7 +87,12 @@ impl Plan {
                 )));
             }
         }
-        Ok(Self { steps, changes, skipped, missing, way })
+        let is_named = |row: &Row| file.entries.iter().any(|entry| entry.row.place() == row.place());
+        let settings = now.entries.iter().map(|entry| entry.row);
+        let not_in_file = settings
+            .filter(|row| capabilities.restoring.part(row) == Part::Setting && !is_named(row))
+            .collect();
+        Ok(Self { steps, changes, skipped, missing, not_in_file, way })
     }
 
     /// What has to be set at the drive before anything is written: it would load other values over them.
@@ -117,7 +124,7 @@ impl Plan {
         table
     }
 
-    pub(super) fn json(&self, file: &Backup, now: &Backup) -> [(&'static str, Value); 2] {
+    pub(super) fn json(&self, file: &Backup, now: &Backup) -> [(&'static str, Value); 3] {
         let changes = self.changes.iter().map(|Change { row, held, wanted }| {
             json!({
                 "mnemonic": row.code,
@@ -129,7 +136,12 @@ impl Plan {
             })
         });
         let skipped = self.skipped.iter().map(|(row, why)| json!({ "mnemonic": row.code, "why": why }));
-        [("changes", changes.collect()), ("skipped", skipped.collect())]
+        let not_in_file = self.not_in_file.iter().map(|row| json!(row.code));
+        [
+            ("changes", changes.collect()),
+            ("skipped", skipped.collect()),
+            ("not_in_file", not_in_file.collect()),
+        ]
     }
 }
 

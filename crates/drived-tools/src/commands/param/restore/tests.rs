@@ -576,6 +576,22 @@ async fn the_eeprom_is_written_only_where_it_is_asked_for_or_the_drive_does_it_b
 }
 
 #[tokio::test(start_paused = true)]
+async fn of_a_file_that_was_cut_off_it_is_said_what_it_does_not_have() {
+    let mut file = Bench::kept(Family::ATV312).await;
+    let mut whole = Bench::of(Family::ATV312, SetUp::ForTheBus);
+    let told = say(&mut whole, &file, &[]).await.unwrap();
+    assert_eq!(told.json["not_in_file"], serde_json::json!([]), "{:?}", told.text);
+    assert!(!told.text.iter().any(|text| text.contains("cut off")), "{:?}", told.text);
+
+    let lost: Vec<_> = file.entries.drain(40..).map(|entry| entry.row.code).collect();
+    assert!(lost.contains(&"SLL"));
+    let told = say(&mut whole, &file, &[]).await.unwrap();
+    let said = told.json["not_in_file"].as_array().unwrap();
+    assert!(said.contains(&"SLL".into()) && said.len() <= lost.len(), "{said:?}");
+    assert!(told.text.iter().any(|text| text.contains("cut off") && text.contains("SLL")), "{:?}", told.text);
+}
+
+#[tokio::test(start_paused = true)]
 async fn of_a_drive_that_tells_nothing_nobody_says_that_it_holds_what_the_file_has() {
     // The 3G3EV has no identification: the first that it does not answer is a parameter.
     let file = Bench::kept(Family::OMRON_3G3EV).await;
