@@ -145,7 +145,7 @@ impl Commanded {
         let stop = self.handle.stop(order);
         let mut watch = self.handle.watch();
         let mut seconds = interval_at(Instant::now() + SECOND, SECOND);
-        let (mut waited, mut taken) = (0, false);
+        let (mut waited, mut taken, mut is_alarm) = (0, false, false);
         while self.has_started && timeout(Duration::ZERO, self.ending.asked()).await.is_ok() {}
         let outcome = loop {
             tokio::select! {
@@ -161,7 +161,18 @@ impl Commanded {
                 }
                 Ok(()) = watch.changed() => {
                     let Some(pending) = watch.look().stop else { continue };
-                    let first = pending.taken && !std::mem::replace(&mut taken, pending.taken);
+                    let was_taken = std::mem::replace(&mut taken, pending.taken);
+                    let first = pending.taken && !was_taken;
+                    if was_taken && !pending.taken {
+                        let _ = self.say(format_args!(
+                            "{name}: a run command came behind the stop: the drive shows {}, and it is sent again", self.status()
+                        ));
+                    }
+                    if pending.alarm && !std::mem::replace(&mut is_alarm, pending.alarm) {
+                        output::complain(format_args!(
+                            "{UNCONFIRMED}. {name}: the drive shows {}; it is waited for all the same", self.status()
+                        ));
+                    }
                     if first {
                         self.tell_what_it_took().await;
                         // A reader who went away ends no stop.
