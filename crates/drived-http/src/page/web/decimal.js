@@ -23,4 +23,6 @@ export function read(field) {
 export function write(field, number) {
   const text = String(number ?? '');
   field.value = language() === 'fr' ? text.replace('.', ',') : text;
+  // What was wrong with what stood there before does not hold the form back.
+  field.setCustomValidity('');
 }

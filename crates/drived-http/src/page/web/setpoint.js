@@ -37,7 +37,8 @@ export function setpointControl(send) {
     // Nobody's choice is pulled from under his finger by what the drive reports.
     if (!touched) {
       const held = setpointOf(drive)?.frequency_hz;
-      write(field, held);
+      // Nor what is selected to be written over.
+      if (document.activeElement !== field) write(field, held);
       slider.value = held ?? limits.low;
     }
     draw(drive);
