@@ -113,6 +113,42 @@ async fn when_one_does_not_start_the_others_are_stopped_again() {
     assert!(nobody_runs(&plant));
 }
 
+/// What has the terminals of the Altivar 21 turn its motor at 20 Hz: they command, and the bus gives the reference (its Modbus manual, §6.2).
+const TERMINALS_RUN: [&str; 4] = ["set CMOD 0", "set FMOD 4", "master FA01 2000", "terminal F on"];
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_its_terminals_turn_is_not_ready_and_is_left_alone() {
+    let plant = four().await;
+    let others = plant.machine_of("atv21").clone();
+    TERMINALS_RUN.iter().for_each(|deed| plant.happens_to("atv21", deed));
+    others.wait_until(|machine| machine.output_frequency == 2_000).await;
+    sleep(2 * SECOND).await;
+    let failure = plant.fleet.all().start(start(Duration::ZERO)).await.expect_err("one is in other hands");
+    let GroupFailure::NotReady(unready) = failure else { panic!("{failure}") };
+    assert_eq!(unready.len(), 1);
+    assert!(unready[0].1.to_string().contains("terminals"), "{}", unready[0].1);
+    sleep(5 * SECOND).await;
+    assert_eq!(others.observe().output_frequency, 2_000);
+    assert!(!plant.machine_of("atv312").observe().running);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_its_terminals_turn_before_its_turn_comes_is_left_alone_when_the_group_is_stopped() {
+    let plant = std::sync::Arc::new(four().await);
+    let (first, around) = (plant.machine_of("atv312").clone(), plant.clone());
+    tokio::spawn(async move {
+        first.wait_until(|machine| machine.running).await;
+        TERMINALS_RUN.iter().for_each(|deed| around.happens_to("atv21", deed));
+    });
+    let failure = plant.fleet.all().start(start(2 * SECOND)).await.expect_err("one refuses");
+    let GroupFailure::Failed { outcomes, stopped } = failure else { panic!("{failure}") };
+    assert_eq!(outcomes[0].0.as_ref(), "atv21");
+    assert_eq!(stopped.confirmed.len(), 2, "{stopped}");
+    sleep(10 * SECOND).await;
+    assert_eq!(plant.machine_of("atv21").observe().output_frequency, 2_000);
+    assert!(!plant.machine_of("atv312").observe().running);
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_group_that_failed_to_start_does_not_slow_a_freewheel_that_is_under_way() {
     let plant = four().await;

@@ -192,12 +192,23 @@ impl Plant {
     /// # Panics
     /// When the simulator does not know it.
     pub fn happens(&self, deed: &str) {
-        let text = match deed.strip_prefix("line ") {
-            Some(_) => deed.to_owned(),
-            None => format!("{} {deed}", self.machine().name()),
-        };
+        match deed.strip_prefix("line ") {
+            Some(_) => self.say(deed),
+            None => self.say(&format!("{} {deed}", self.machine().name())),
+        }
+    }
+
+    /// The same around the machine of this drive.
+    ///
+    /// # Panics
+    /// When the simulator does not know it.
+    pub fn happens_to(&self, drive: &str, deed: &str) {
+        self.say(&format!("{} {deed}", self.machine_of(drive).name()));
+    }
+
+    fn say(&self, text: &str) {
         for site in &self.sites {
-            site.simulated.control(&text).unwrap_or_else(|error| panic!("{text}: {error}"));
+            site.simulated.control(text).unwrap_or_else(|error| panic!("{text}: {error}"));
         }
     }
 

@@ -113,12 +113,12 @@ pub enum GroupFailure {
     NotReady(Vec<(Arc<str>, Refused)>),
     /// The runtime of the fleet has ended before it was known: what became of each. **Nobody stops again what may turn** by it.
     Abandoned(Vec<(Arc<str>, Outcome)>),
-    /// All were ready, and these did not start; those that did were stopped again.
+    /// All were ready, and these did not start, or did not take the setpoint; those that were started were stopped again.
     Failed {
         /// The outcomes that are not confirmed. Drives whose turn had not come are not among them: they were never
         /// commanded.
         outcomes: Vec<(Arc<str>, Outcome)>,
-        /// What became of the stop.
+        /// What became of the stop; of nobody where nobody was started.
         stopped: StopReport,
     },
 }
@@ -135,6 +135,10 @@ impl fmt::Display for GroupFailure {
             }
             Self::Abandoned(outcomes) => {
                 f.write_str("the fleet has ended meanwhile, nobody is stopped again:")?;
+                outcomes.iter().try_for_each(|(name, outcome)| write!(f, " {name} ({outcome})"))
+            }
+            Self::Failed { outcomes, stopped } if *stopped == StopReport::default() => {
+                f.write_str("nobody was started, because not all took the setpoint:")?;
                 outcomes.iter().try_for_each(|(name, outcome)| write!(f, " {name} ({outcome})"))
             }
             Self::Failed { outcomes, stopped } => {
@@ -248,7 +252,7 @@ impl Group {
         self.in_one_act().stop_each(order.into(), true)
     }
 
-    /// Stops every drive of the group, by a broadcast first where there can be one and it is wanted. Line by line, and nothing is made here
+    /// Stops those of these drives that may be commanded, by a broadcast first where there can be one and it is wanted. Line by line, and nothing is made here
     /// but what a stop needs: among ten thousand drives the last is stopped no later than it has to be.
     fn stop_each(&self, order: StopOrder, by_broadcast: bool) -> GroupStop {
         let standing = self.fleet.members();
@@ -312,7 +316,7 @@ impl Group {
 
     /// Starts every drive of the group, or none: first all are asked whether they would start, then they start, as close
     /// together as their lines allow or one after the other. When one of them does not, no other is begun, and those
-    /// that did are stopped again along their ramps.
+    /// that did are stopped again along their ramps. Who refused, or whose turn had not come, is left alone.
     ///
     /// On one line the starts wait for each other here and not on the line: one drive is commanded at a time, and after
     /// it the line is left to the polls for as long as they need it to keep every value fresh, by the line's plan. So a
@@ -351,7 +355,12 @@ impl Group {
         // Before the first start, so that a setpoint that one of them refuses starts nobody.
         if let Some(setpoint) = setpoint.filter(|_| together) {
             let order = Order::Setpoint { setpoint, until: Until::InForce };
-            self.keep_or_stop(self.all_or_none(&leaves, order, spacing, told).await).await?;
+            let given = self.all_or_none(&leaves, order, spacing, told).await;
+            let outcomes: Vec<_> =
+                { given.into_iter() }.filter(|(_, outcome)| !outcome.lets_a_start_follow()).collect();
+            if !outcomes.is_empty() {
+                return Err(GroupFailure::Failed { outcomes, stopped: StopReport::default() });
+            }
         }
         let setpoint = setpoint.filter(|_| !together);
         let order = Order::Start { direction, setpoint, until: Until::InForce };
@@ -428,14 +437,19 @@ impl Group {
     }
 
     async fn keep_or_stop(&self, outcomes: Vec<(Arc<str>, Outcome)>) -> GroupStarted {
-        let (confirmed, outcomes): (Vec<_>, Vec<_>) =
-            outcomes.into_iter().partition(|(_, outcome)| outcome.lets_a_start_follow());
-        if outcomes.is_empty() {
-            return Ok(confirmed);
+        if outcomes.iter().all(|(_, outcome)| outcome.lets_a_start_follow()) {
+            return Ok(outcomes);
         }
-        // A drive whose start is uncertain is among those that are stopped. What somebody else is stopping already, and
-        // perhaps by its freewheel, is not slowed down by this.
-        let stopped = self.stop_each(StopMode::Ramp.into(), false).finished().await;
+        // A drive whose start is uncertain is among those that are stopped; not one that this group has not begun, which may be in
+        // somebody else's hands. What somebody else is stopping already, and perhaps by its freewheel, is not slowed down by this.
+        let begun = |name: &Arc<str>| {
+            outcomes.iter().any(|(other, outcome)| other == name && outcome.may_have_started())
+        };
+        let members = self.members.iter().filter(|member| begun(member.name())).cloned().collect();
+        let begun = Self::new(self.fleet.clone(), members);
+        let stopped = begun.stop_each(StopMode::Ramp.into(), false).finished().await;
+        let outcomes =
+            { outcomes.into_iter() }.filter(|(_, outcome)| !outcome.lets_a_start_follow()).collect();
         Err(GroupFailure::Failed { outcomes, stopped })
     }
 }

@@ -153,6 +153,11 @@ impl Outcome {
         }
     }
 
+    /// Whether a run command of a start with this outcome is in the drive, or may be.
+    pub(crate) const fn may_have_started(&self) -> bool {
+        !matches!(self, Self::Refused(_) | Self::Expired | Self::NotConfirmed(Unconfirmed::NotStarted { .. }))
+    }
+
     /// Of a start that is in force: which way, and the setpoint that it uses.
     #[must_use]
     pub const fn started(&self) -> Option<Started> {

@@ -1,6 +1,6 @@
 //! Whether an order may be sent: the rules of motion (4, 7, 11) and the policies of the settings. To ask changes nothing.
 
-use drive_core::{Direction, Refusal, Setpoint, Status};
+use drive_core::{Control, Direction, Motion, Refusal, Setpoint, Status};
 use tokio::time::Instant;
 
 use super::{Asker, Job, Supervisor, orders::Active};
@@ -64,9 +64,18 @@ impl Supervisor {
             Some(refused) => Err(refused),
             None => {
                 let leave = Leave { stops: self.stops, direction };
-                self.allow(now, order, None).map(|_| leave).map_err(Blocked::reason)
+                self.allow(now, order, None).map_err(Blocked::reason)?;
+                self.driven_by_another().map_or(Ok(leave), |refusal| Err(Refused::Because(refusal)))
             }
         }
+    }
+
+    /// Who turns the motor instead of the bus, by the last status: no family takes it over from him. A motor that nobody turns is for
+    /// the family to judge.
+    fn driven_by_another(&self) -> Option<Refusal> {
+        let status = &self.status.as_ref()?.value;
+        let other = status.control.filter(|control| *control != Control::Bus)?;
+        (status.motion == Motion::Driven).then_some(Refusal::NotInControl(other))
     }
 
     /// Why a start would not be sent now, whoever asks for it.

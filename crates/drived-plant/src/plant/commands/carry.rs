@@ -9,7 +9,7 @@ use std::{
 
 use drive_fleet::{
     Act, DriveHandle, Fleet, Group, GroupFailure, GroupStart, GroupStop, GroupTicket, Link, Order, Outcome,
-    StopTicket, Ticket, view::StopModesView,
+    StopReport, StopTicket, Ticket, view::StopModesView,
 };
 use futures_util::future::join_all;
 use tokio::{
@@ -294,11 +294,16 @@ impl Work {
                     self.end_of(&name, &outcome);
                 }
             }
-            Err(GroupFailure::Failed { outcomes, .. }) => {
+            Err(GroupFailure::Failed { outcomes, stopped }) => {
                 for (name, outcome) in outcomes {
                     self.end_of(&name, &outcome);
                 }
-                let text = "the group was stopped again, because not all of its drives started";
+                let text = match stopped == StopReport::default() {
+                    true => {
+                        "nobody of the group was started, because not all of its drives took the setpoint"
+                    }
+                    false => "the group was stopped again, because not all of its drives started",
+                };
                 self.end_all(OutcomeWord::Superseded, GROUP_FAILED, text);
             }
         }
