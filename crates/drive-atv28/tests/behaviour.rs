@@ -70,6 +70,9 @@ async fn each_stop_mode_is_seen_at_once_and_ends_at_standstill() {
         assert_eq!(status.state, state, "{mode}");
         assert_eq!(commands(&machine).last(), Some(&word), "{mode}");
         assert!(machine.observe().shaft_frequency > 0, "{mode}: a stop takes its time");
+        // A fast stop is told from a cut by looks that see it come down: it is faster than the factory's ramp.
+        machine.wait_until(|seen| seen.shaft_frequency < 4_000).await;
+        drive.status().await.unwrap();
         // The injection lasts as long as its bit.
         let injects = mode == StopMode::DcInjection;
         machine.wait_until(|seen| seen.shaft_frequency == 0 && seen.running == injects).await;

@@ -91,6 +91,10 @@ pub const INJECTION_AT_MOST: Duration = Duration::from_secs(30);
 /// answers.
 const ROUNDING: u32 = 50;
 
+/// The shortest ramp that these drives have from the factory, in hundredths of a hertz: 50 Hz in 3 s (`dEC`, BBV51701 p. 29; the
+/// Altivar 28 and 58 the same, the Altivar 21 and the 3G3EV 10 s).
+const FACTORY_RAMP: (u32, Duration) = (5_000, Duration::from_secs(3));
+
 /// What was last seen of the shaft, or is to be taken for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Past {
@@ -133,19 +137,26 @@ impl Descent {
         self.last = Some((now, output));
     }
 
-    /// Whether an output that is gone at `now` cannot have come down so fast: it was cut, whatever the drive says.
+    /// Whether an output that is gone at `now` cannot have come down so fast, or hardly: it was cut, whatever the drive says. A third
+    /// faster than it was seen to come down is still a ramp; of one of which nothing was seen that of the factory is.
     fn is_cut(&self, now: Instant) -> bool {
-        self.until(now, 0).is_some_and(|(passed, needed)| passed * 2 < needed)
+        let counts_in = |(counts, time)| self.until(now, counts, time, ROUNDING);
+        match self.rate {
+            Some(rate) => counts_in(rate).is_some_and(|(passed, needed)| passed * 4 < needed * 3),
+            None => counts_in(FACTORY_RAMP).is_some_and(|(passed, needed)| passed < needed),
+        }
     }
 
     /// Whether an output that is gone at `now` had the time to come down as fast as it was seen to.
     fn has_come_down(&self, now: Instant) -> bool {
-        self.until(now, ROUNDING).is_some_and(|(passed, needed)| passed >= needed)
+        let seen = self.rate.and_then(|(counts, time)| self.until(now, counts, time, ROUNDING));
+        seen.is_some_and(|(passed, needed)| passed >= needed)
     }
 
-    /// How long ago it was last seen, and how long it takes from there down to an output of `end`, by how fast it came down.
-    fn until(&self, now: Instant, end: u32) -> Option<(Duration, Duration)> {
-        let ((then, output), (counts, time)) = self.last.zip(self.rate)?;
+    /// How long ago it was last seen, and how long it takes from there down to an output of `end`, by so many hundredths of a hertz in a
+    /// time.
+    fn until(&self, now: Instant, counts: u32, time: Duration, end: u32) -> Option<(Duration, Duration)> {
+        let (then, output) = self.last?;
         Some((now.saturating_duration_since(then), time * output.saturating_sub(end) / counts.max(1)))
     }
 }
@@ -510,15 +521,17 @@ mod tests {
     async fn a_ramp_that_has_ended_leaves_a_shaft_at_rest() {
         let (mut shaft, now) = (Shaft::new(), Instant::now());
         assert_eq!(shaft.see(now, Output::Braking(Frequency::from_hertz(3)), None), Motion::Braking);
-        assert_eq!(shaft.see(now, Output::None, Some(Frequency::ZERO)), Motion::AtRest);
+        let later = now + Duration::from_millis(200);
+        assert_eq!(shaft.see(later, Output::None, Some(Frequency::ZERO)), Motion::AtRest);
     }
 
     #[tokio::test(start_paused = true)]
     async fn an_output_that_is_gone_sooner_than_its_ramp_brings_it_down_was_cut() {
         for (last, said_to_be_over, not_said) in [
             (200, Motion::Coasting, Motion::Coasting),
-            // More than half of the time: the drive may have come down faster in the end, if it says that its ramp is over.
-            (1_000, Motion::AtRest, Motion::Coasting),
+            (1_000, Motion::Coasting, Motion::Coasting),
+            // More than three quarters of the time: the drive may have come down faster in the end, if it says that its ramp is over.
+            (1_500, Motion::AtRest, Motion::Coasting),
             (1_800, Motion::AtRest, Motion::AtRest),
         ] {
             let (mut shaft, begun) = (Shaft::new(), Instant::now());
@@ -539,12 +552,18 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn an_output_that_is_gone_behind_one_look_alone_tells_no_ramp_where_another_stop_may_stand() {
-        for (shown, motion) in [(Output::None, Motion::AtRest), (Output::Gone, Motion::Coasting)] {
+    async fn an_output_that_is_gone_behind_one_look_alone_tells_no_ramp_but_that_of_the_factory() {
+        for (shown, after, motion) in [
+            // A freewheel input behind the word of a stop: 30 Hz that are gone at the next look.
+            (Output::None, 500, Motion::Coasting),
+            (Output::None, 1_800, Motion::AtRest),
+            // Another stop may stand there by now.
+            (Output::Gone, 1_800, Motion::Coasting),
+        ] {
             let (mut shaft, begun) = (Shaft::new(), Instant::now());
-            shaft.see(begun, Output::Braking(Frequency::from_hertz(20)), Some(Frequency::from_hertz(20)));
-            let later = begun + Duration::from_millis(400);
-            assert_eq!(shaft.see(later, shown, Some(Frequency::ZERO)), motion, "{shown:?}");
+            shaft.see(begun, Output::Braking(Frequency::from_hertz(30)), Some(Frequency::from_hertz(30)));
+            let later = begun + Duration::from_millis(after);
+            assert_eq!(shaft.see(later, shown, Some(Frequency::ZERO)), motion, "{shown:?} after {after}");
         }
         let now = Instant::now();
         assert_eq!(resting(now).see(now, Output::Gone, Some(Frequency::ZERO)), Motion::AtRest);
