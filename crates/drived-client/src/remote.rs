@@ -31,7 +31,7 @@ pub struct Remote {
 impl Remote {
     /// Asks for a command of this id so often.
     pub fn new(daemon: Daemon, id: &str, every: Duration) -> Self {
-        Self { daemon, path: path_of(&["commands", id]), every, is_lost: false }
+        Self { daemon, path: format!("{}?wait=0s", path_of(&["commands", id])), every, is_lost: false }
     }
 
     async fn asked(&mut self) -> Result<Arc<CommandView>, Lost> {
@@ -40,6 +40,8 @@ impl Remote {
             self.daemon = timely(self.daemon.way().connect()).await.map_err(for_now)?;
             self.is_lost = false;
         }
+        // Whoever stops waiting in the middle leaves an answer under way, which is none to the next question.
+        self.is_lost = true;
         let answer = timely(self.daemon.get(&self.path)).await;
         self.is_lost = answer.is_err();
         let answer = answer.map_err(for_now)?;
@@ -65,4 +67,31 @@ impl Source for Remote {
 pub async fn timely<T>(answer: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
     let late = |_| Failure::Drive("the daemon does not answer".to_owned());
     timeout(ANSWERED_WITHIN, answer).await.map_err(late)?
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::{Json, Router, routing::get};
+    use serde_json::json;
+
+    use super::*;
+    use crate::Way;
+
+    #[tokio::test(start_paused = true)]
+    async fn who_stops_waiting_in_the_middle_of_an_answer_has_the_next_one() {
+        let command = json!({"id": "a", "drive": "fan 1", "action": "stop", "command": "ramp stop", "caller": "local",
+            "origin": "socket", "outcome": "pending", "open": true, "time_unix_ms": 1});
+        let slow = async || {
+            sleep(Duration::from_millis(300)).await;
+            Json(command)
+        };
+        let router = Router::new().route("/api/v1/commands/a", get(slow));
+        let every = Duration::from_millis(500);
+        let mut remote = Remote::new(Way::here(router).connect().await.unwrap(), "a", every);
+        for _ in 0..3 {
+            assert!(timeout(every + Duration::from_millis(100), remote.news()).await.is_err());
+            let told = remote.news().await;
+            assert!(told.is_ok(), "{told:?}");
+        }
+    }
 }

@@ -100,6 +100,22 @@ fn every_verb_goes_to_the_running_daemon_by_the_names_of_its_drives() {
 }
 
 #[test]
+fn a_stop_that_takes_its_time_is_waited_for_without_a_word_of_a_daemon_that_is_silent() {
+    let mut daemon = Daemon::start("slow-ramp", "");
+    // 30 s from 50 Hz.
+    daemon.sim.say("atv312@1 set dEC 300", "done");
+    daemon.ask(&["start", "pump 1", "--setpoint", "20Hz"]).assert_done();
+    daemon.sim.say("atv312@1 show", "output");
+    let stopped = daemon.ask(&["stop", "pump 1"]);
+    let out = stopped.assert_done();
+    assert!(
+        out.contains("has not confirmed it yet: it goes on") && !out.contains("does not answer"),
+        "{out}"
+    );
+    assert!(out.contains("pump 1 stands still"), "{out}");
+}
+
+#[test]
 fn a_stop_by_injection_goes_through_the_daemon_with_its_seconds() {
     let daemon = Daemon::start("injection", "");
     daemon.ask(&["start", "pump 1", "--setpoint", "30Hz"]).assert_done();
