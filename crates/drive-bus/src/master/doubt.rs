@@ -76,6 +76,8 @@ struct Known {
     wrote: Option<u16>,
     /// Something else was written since.
     overtaken: bool,
+    /// An answer of its shape was taken since: which of the two that was nobody knows, and the other one may still come.
+    may_have_come: bool,
     /// Its port was lost. What comes over the next one may be anything that the last one left behind, also an echo, so
     /// that no frame proves that this answer has come.
     over_a_lost_port: bool,
@@ -93,18 +95,22 @@ impl Doubt {
     ) {
         self.strange_until = Some(now + MEMORY);
         let avoid = until.max(now + MEMORY);
-        self.remember(Known {
-            shape,
-            wait: until,
-            avoid,
-            will_come: true,
-            stray: false,
-            owed: true,
-            asked_again: false,
-            wrote,
-            overtaken: false,
-            over_a_lost_port,
-        });
+        self.remember(
+            now,
+            Known {
+                shape,
+                wait: until,
+                avoid,
+                will_come: true,
+                stray: false,
+                owed: true,
+                asked_again: false,
+                wrote,
+                overtaken: false,
+                may_have_come: false,
+                over_a_lost_port,
+            },
+        );
     }
 
     /// An intact frame came that was no answer to what was asked, or another master's request for one.
@@ -123,7 +129,7 @@ impl Doubt {
         if shape != Shape::ANY {
             let heard = Known::come(shape, now + DOUBLE, now + MEMORY);
             let stray = !was_owed && self.is_no_double(now, frame);
-            self.remember(Known { will_come: is_request, stray, ..heard });
+            self.remember(now, Known { will_come: is_request, stray, ..heard });
         }
         let taken = self.taken.filter(|taken| {
             !is_request
@@ -183,13 +189,17 @@ impl Doubt {
             .retain(|known| known.avoid > now && (known.shape != shape || known.will_come || known.stray));
         for known in self.known.iter_mut().filter(|known| known.wait <= now) {
             known.wrote = None;
+            // Once: a shape that is asked for all the time would be avoided for ever.
+            if known.owed && known.shape == shape && !known.may_have_come {
+                (known.may_have_come, known.avoid) = (true, now + MEMORY);
+            }
         }
         let strange = self.is_strange(now);
         // An answer that is late is late once, and then no reason any more to wait.
         let owes = self.known.iter().any(|known| known.owed);
         let unexplained = self.unexplained_until.is_some_and(|until| until > now);
         let wait = now + again.or((unexplained || owes).then_some(DOUBLE)).unwrap_or_default();
-        self.remember(Known::come(shape, wait, now + if strange { MEMORY } else { double }));
+        self.remember(now, Known::come(shape, wait, now + if strange { MEMORY } else { double }));
     }
 
     /// Anything may have come meanwhile: nothing is asked until `until`.
@@ -290,11 +300,20 @@ impl Doubt {
         self.strange_until.is_some_and(|until| until > now)
     }
 
-    fn remember(&mut self, known: Known) {
+    fn remember(&mut self, now: Instant, known: Known) {
         if self.known.len() >= MOST {
-            // What will come outlasts what has come: every value that is written has a shape of its own.
-            let least = self.known.iter().position(|known| !known.will_come && !known.stray).unwrap_or(0);
-            self.known.remove(least);
+            // What is waited for stays: the answer that was taken last may come again at any moment. Of the rest what will come
+            // outlasts what has come, for every value that is written has a shape of its own, and once of each shape is enough.
+            let outlasts = |index: usize, known: &Known| {
+                let later = self.known.iter().skip(index + 1);
+                (known.will_come || known.stray)
+                    && !{ later }.any(|later| later.shape == known.shape && later.will_come)
+            };
+            let all = self.known.iter().enumerate();
+            let least = all.min_by_key(|(index, known)| (known.wait > now, outlasts(*index, known)));
+            if let Some((least, _)) = least {
+                self.known.remove(least);
+            }
         }
         // Nearly always it is one.
         self.known.reserve_exact(1);
@@ -314,6 +333,7 @@ impl Known {
             asked_again: false,
             wrote: None,
             overtaken: false,
+            may_have_come: false,
             over_a_lost_port: false,
         }
     }

@@ -176,8 +176,6 @@ impl<C> Master<C> {
             Purpose::Call(Some(mut entry)) => {
                 let why = "the answer may be that to an earlier request".to_owned();
                 entry.work.last = Some(PortError::Mismatch(why));
-                // Longer it may have been refused before.
-                entry.work.asked_longer = true;
                 self.schedule.put_back(entry);
             }
             _ => self.station(slave).stats.outcomes.withdrawn += 1,
