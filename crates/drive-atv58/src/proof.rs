@@ -119,6 +119,11 @@ impl<P: Port> Atv58<P> {
                     // A motor that turns round is at zero for a moment.
                     if self.idle > 1 { Told::No(STOPPED) } else { Told::NotTold }
                 }
+                (Some(output), Some(reference))
+                    if self.proof.watch.is_brought_down(status.direction, output, reference) =>
+                {
+                    Told::NotTold
+                }
                 _ => Told::Yes,
             },
             Some(_) => Told::No(LOCKED),
