@@ -73,7 +73,7 @@ fn a_drive_that_does_not_answer_is_named_and_the_exit_code_is_1() {
         sim.on("atv312@2", subcommand).assert_refused(1, "atv312@2 does not answer");
     }
     let stop = sim.on("atv312@2", &["stop"]);
-    stop.assert_refused(1, "STOP NOT CONFIRMED");
+    stop.assert_stop_not_confirmed();
     assert!(stop.out.starts_with("atv312@2 has not confirmed the stop after 1 s"), "{stop:?}");
     let poll =
         run(&["poll", "--line", sim.link(), "--drive", "atv312@1-2", "--period", "0", "--seconds", "3"]);
@@ -342,7 +342,7 @@ fn a_stop_goes_on_against_a_drive_that_says_that_it_is_busy_and_is_an_alarm_in_i
     sim.on("atv28@1", &["start"]).assert_done();
     sim.say("atv28@1 busy on", "done");
     let stop = sim.on("atv28@1", &["stop"]);
-    stop.assert_refused(1, "STOP NOT CONFIRMED, the motor may turn: use the emergency stop");
+    stop.assert_stop_not_confirmed();
     assert!(sim.say("atv28@1 show", "output").starts_with("fed"), "nothing has stopped it");
 
     let mut stop = Running::start(&["stop", "--line", sim.link(), "--drive", "atv28@1"]);

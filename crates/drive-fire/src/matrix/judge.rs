@@ -85,6 +85,13 @@ impl Notes {
         }
     }
 
+    /// A stop was confirmed: the motor was seen to come down, whatever its status was told of before.
+    pub(super) fn comes_down(&self) {
+        if let Some((_, told)) = self.noted().looked.as_mut() {
+            *told = Motion::Braking;
+        }
+    }
+
     /// What was found, and why nobody can tell it where nobody can. What UNI-TELWAY carries is no PDU of Modbus, so that no answer is
     /// held against the machine's there.
     pub(super) fn verdict(

@@ -70,6 +70,9 @@ async fn ask(story: &Story, stage: &mut Stage, operation: Operation, done: &mut 
     let asks = Asks { operation, subject: story.subject, touched: done.touched };
     let told = timeout(PATIENCE, operate(asks, stage)).await.ok()?;
     let seen = stage.bench.machine.observe();
+    if matches!(operation, Operation::Stop(_)) && told.is_ok() {
+        stage.bench.notes.comes_down();
+    }
     match &told {
         Ok(Some(status)) => stage.bench.judge_status(status, asked, operation == Operation::Status),
         Err(Error::NotConfirmed { status, .. }) => stage.bench.judge_status(status, asked, false),

@@ -56,6 +56,15 @@ impl Ended {
         assert!(!self.err.contains("panicked"), "{self:?}");
     }
 
+    /// It is an alarm that a stop is not confirmed: when it is one, while the stop goes on, and once more when that ends.
+    #[track_caller]
+    pub(crate) fn assert_stop_not_confirmed(&self) {
+        assert_eq!(self.code, Some(1), "{self:?}");
+        let alarm = "drived: STOP NOT CONFIRMED, the motor may turn: use the emergency stop. ";
+        assert!(self.err.lines().all(|line| line.starts_with(alarm)), "{self:?}");
+        assert!((1..=2).contains(&self.err.lines().count()), "{self:?}");
+    }
+
     /// It ended well, and said nothing on stderr.
     #[track_caller]
     pub(crate) fn assert_done(&self) -> &str {
