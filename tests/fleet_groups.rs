@@ -133,6 +133,21 @@ async fn a_motor_that_its_terminals_turn_is_not_ready_and_is_left_alone() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn nothing_is_written_to_a_drive_that_stands_and_that_somebody_else_commands() {
+    let plant = Plant::single(Family::ATV312, |_| {});
+    // BBV51701 p. 44: LI5 forces local, the terminals' channel.
+    ["set FLO 133", "set FLOC 1", "terminal LI5 on"].iter().for_each(|deed| plant.happens(deed));
+    plant.motor().ready(60 * SECOND).await.expect("it gets ready");
+    sleep(3 * SECOND).await;
+    let before = plant.machine().received().len();
+    let outcome = plant.motor().start_at(Direction::Forward, Frequency::from_hertz(20)).await;
+    assert!(matches!(outcome, Outcome::Refused(_)), "{outcome}");
+    let writes = |pdu: &[u8]| matches!(pdu.first(), Some(6 | 16));
+    let received = plant.machine().received();
+    assert!(!received[before..].iter().any(|request| writes(&request.pdu)), "{outcome}");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_motor_that_its_terminals_turn_before_its_turn_comes_is_left_alone_when_the_group_is_stopped() {
     let plant = std::sync::Arc::new(four().await);
     let (first, around) = (plant.machine_of("atv312").clone(), plant.clone());

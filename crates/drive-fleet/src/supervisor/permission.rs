@@ -173,13 +173,14 @@ impl Supervisor {
         })
     }
 
-    /// Whether a status that is no older than a command may be has shown a sound motor that nothing drives. The setpoint of a start
+    /// Whether a status that is no older than a command may be has shown a sound motor that nothing drives and nobody else commands. The setpoint of a start
     /// changes no speed of such a one, and the drive is not asked first whether it will refuse the start: thirty that start at once
     /// on one line have no time for a question more.
     fn was_just_at_rest(&self, now: Instant) -> bool {
         self.status.as_ref().is_some_and(|status| {
             let is_new = status.age(now) <= self.settings.times.lifetime;
-            is_new && status.value.is_undriven() && !status.value.is_fault()
+            let elsewhere = status.value.control.is_some_and(|control| control != Control::Bus);
+            is_new && status.value.is_undriven() && !status.value.is_fault() && !elsewhere
         })
     }
 

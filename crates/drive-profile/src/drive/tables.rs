@@ -9,7 +9,7 @@ use drive_core::{
 };
 
 use crate::{
-    format::{self, ModeName, Register, UnitName},
+    format::{self, Byte, ModeName, Register, UnitName},
     profile::Profile,
 };
 
@@ -144,7 +144,8 @@ impl Profile {
         said.unwrap_or(usual)
     }
 
-    /// Its registers, coils and inputs, but for the second byte of a word: those that are no parameters are only read.
+    /// Its registers, coils and inputs, but for the second byte of a word: those that are no parameters are only read. Of a byte the
+    /// word is shown that it is in, without a unit.
     fn rows(&self) -> Vec<Row> {
         let mut rows: Vec<Row> = Vec::new();
         for (name, spanned) in &self.file.register {
@@ -165,7 +166,11 @@ impl Profile {
             space,
             address,
             code: interned::text(name),
-            name: interned::text(&register.what),
+            name: match register.byte {
+                None => interned::text(&register.what),
+                Some(Byte::High) => interned::text(&format!("{}: the high byte of this word", register.what)),
+                Some(Byte::Low) => interned::text(&format!("{}: the low byte of this word", register.what)),
+            },
             access: match register.access {
                 format::Access::Write => Access::Write,
                 format::Access::WriteStopped if register.parameter => Access::WriteStopped,
@@ -178,7 +183,7 @@ impl Profile {
                 Some(format::Storage::Eeprom) => Storage::Eeprom,
                 Some(format::Storage::Unknown) => Storage::Unknown,
             },
-            unit: if space.is_bit() { Unit::CODE } else { unit(register) },
+            unit: if space.is_bit() || register.byte.is_some() { Unit::CODE } else { unit(register) },
             range: match &register.range {
                 _ if space.is_bit() => Range::OneOf(BIT),
                 Some(range) => {
