@@ -3,13 +3,13 @@
 use std::{fmt, time::Duration};
 
 use drive_bus::{Line, LineConfig};
-use drive_core::{Error, ErrorKind, PortError, Status, StopMode};
+use drive_core::{Error, ErrorKind, Frequency, Motion, PortError, Status, StopMode};
 use drive_families::Options;
 use drive_fleet::{
-    DriveHandle, DriveSettings, Event, EventKind, Events, Fleet, LastSeen, Link, Outcome, Periods, Received,
-    Refused, Started, StopModes, StopOrder, Times, Unknown,
+    DriveHandle, DriveSettings, Event, EventKind, Events, Fleet, LastSeen, Link, Outcome, PendingStop,
+    Periods, Received, Refused, Started, StopModes, StopOrder, Timed, Times, Unknown,
 };
-use tokio::time::{Instant, interval_at, timeout};
+use tokio::time::{Instant, MissedTickBehavior, interval_at, timeout};
 
 use drived_client::own_line;
 use drived_words::{drive_spec::DriveName, failure::Failure, output, signals::Ending};
@@ -32,6 +32,58 @@ const SECOND: Duration = Duration::from_secs(1);
 /// From one status to the next, so that the motor is watched while it is commanded.
 const PERIOD: Duration = Duration::from_millis(500);
 
+/// How long a motor is looked after that was started again behind its stop, once it stands: whoever starts it by a cycle does so again
+/// within it.
+const LOOKED_AFTER: Duration = Duration::from_secs(5);
+
+/// How a motor was stopped.
+#[derive(Debug)]
+pub struct Stop {
+    pub modes: StopModes,
+    /// At standstill.
+    pub status: Status,
+    /// How often a run command came behind the stop after the drive had taken it.
+    pub restarts: u32,
+}
+
+/// What is known of a stop that goes on.
+#[derive(Debug, Default)]
+struct Course {
+    last: Option<PendingStop>,
+    restarts: u32,
+}
+
+/// What is new of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum News {
+    Taken,
+    /// The drive is in operation again, though it had taken it.
+    Restarted,
+    Alarm,
+}
+
+impl Course {
+    fn is_taken(&self) -> bool {
+        self.last.is_some_and(|last| last.taken)
+    }
+
+    fn look(&mut self, now: PendingStop, motion: Motion) -> impl Iterator<Item = News> + use<> {
+        let before = self.last.replace(now);
+        let was = |is: fn(&PendingStop) -> bool| before.as_ref().is_some_and(is);
+        let was_taken = was(|stop| stop.taken);
+        // Direct current that has brought it to rest is ended by another mode, and nobody has started it.
+        let is_same = before.is_some_and(|before| before.mode == now.mode);
+        let restarted = was_taken && !now.taken && is_same && motion == Motion::Driven;
+        self.restarts += u32::from(restarted);
+        let news = [
+            restarted.then_some(News::Restarted),
+            (now.alarm && !was(|stop| stop.alarm)).then_some(News::Alarm),
+            (now.taken && !was_taken).then_some(News::Taken),
+        ];
+        news.into_iter().flatten()
+    }
+}
+
 /// The fleet of one drive.
 pub struct Commanded {
     pub name: DriveName,
@@ -44,6 +96,8 @@ pub struct Commanded {
     has_started: bool,
     /// Nobody is told on stdout how it goes, because that is for an object.
     pub is_quiet: bool,
+    #[cfg(test)]
+    said: Vec<(Instant, String)>,
 }
 
 impl Commanded {
@@ -86,6 +140,8 @@ impl Commanded {
             ending,
             has_started: false,
             is_quiet: false,
+            #[cfg(test)]
+            said: Vec::new(),
         })
     }
 
@@ -122,11 +178,11 @@ impl Commanded {
             Some(outcome) => format!("the start is {outcome}"),
             None => "asked to end before the start was confirmed".to_owned(),
         };
-        let (_, stopped) = self.stop(StopMode::Ramp).await.map_err(|failure| {
+        let Stop { status, .. } = self.stop(StopMode::Ramp).await.map_err(|failure| {
             Failure::Drive(format!("{failure}; it was to be stopped again, because {why}"))
         })?;
         Err(Failure::Drive(format!(
-            "{}: {why}, so it was stopped again: the drive shows {stopped}",
+            "{}: {why}, so it was stopped again: the drive shows {status}",
             self.name
         )))
     }
@@ -136,23 +192,77 @@ impl Commanded {
         self.ending.asked().await;
     }
 
-    /// Stops the motor and tells how that goes. Gives how it was stopped, and the status at standstill.
+    /// Stops the motor and tells how that goes.
     ///
     /// A verdict comes in its time, whatever line and port do. Whoever asks the program to end gives up the stop of a motor that
     /// somebody else has started, and not that of one that was started here: whatever was asked before, this stop is its answer.
-    pub async fn stop(&mut self, order: impl Into<StopOrder>) -> Result<(StopModes, Status), Failure> {
+    ///
+    /// A motor that was started again behind the stop is looked after once it stands, and one that is started time and again is no motor
+    /// that was stopped.
+    pub async fn stop(&mut self, order: impl Into<StopOrder>) -> Result<Stop, Failure> {
+        let order = order.into();
+        let mut restarts = 0;
+        loop {
+            let (modes, status) = self.stopped(order, &mut restarts).await?;
+            if restarts > 1 {
+                return Err(Failure::Drive(format!(
+                    "{}: a run command came {restarts} times behind the stop{}, and the motor may run again: end it where it is given, \
+                     such as at another master of the line, or use the emergency stop; the drive shows {status}",
+                    self.name,
+                    self.of_whom()
+                )));
+            }
+            if restarts == 0 || !self.runs_again().await {
+                return Ok(Stop { modes, status, restarts });
+            }
+            restarts += 1;
+            self.say_restarted(&self.status());
+        }
+    }
+
+    /// Whether the motor, which stands, is started within the time for which it is looked after.
+    async fn runs_again(&mut self) -> bool {
+        // It stood: whatever its words call a motor that has an output again, somebody has started it.
+        let drives = self.handle.wait_until(|snapshot| {
+            snapshot.status.as_ref().is_some_and(|Timed { value, .. }| {
+                value.motion == Motion::Driven
+                    || value.motion == Motion::Braking
+                        && value.output_frequency.is_some_and(|output| output != Frequency::ZERO)
+            })
+        });
+        tokio::select! {
+            driven = timeout(LOOKED_AFTER, drives) => driven.is_ok(),
+            () = self.ending.asked() => false,
+        }
+    }
+
+    /// Whose the run commands behind a stop are.
+    const fn of_whom(&self) -> &'static str {
+        match self.has_started {
+            true => ", from somebody else or kept back on its way",
+            false => " from somebody else",
+        }
+    }
+
+    async fn stopped(
+        &mut self,
+        order: StopOrder,
+        restarts: &mut u32,
+    ) -> Result<(StopModes, Status), Failure> {
         let name = self.name;
         let stop = self.handle.stop(order);
         let mut watch = self.handle.watch();
-        let mut seconds = interval_at(Instant::now() + SECOND, SECOND);
-        let (mut waited, mut taken, mut is_alarm) = (0, false, false);
+        let began = Instant::now();
+        let mut seconds = interval_at(began + SECOND, SECOND);
+        seconds.set_missed_tick_behavior(MissedTickBehavior::Skip);
+        let mut course = Course::default();
         while self.has_started && timeout(Duration::ZERO, self.ending.asked()).await.is_ok() {}
         let outcome = loop {
             tokio::select! {
                 biased;
                 outcome = stop.finished() => break outcome,
-                () = self.ending.asked(), if taken || !self.has_started => {
-                    return Err(Failure::Drive(match taken {
+                () = self.ending.asked(), if course.is_taken() || !self.has_started => {
+                    return Err(Failure::Drive(match course.is_taken() {
                         true => format!(
                             "{name}: asked to end while the motor came to its stop: the drive showed {}", self.status()
                         ),
@@ -161,47 +271,49 @@ impl Commanded {
                 }
                 Ok(()) = watch.changed() => {
                     let Some(pending) = watch.look().stop else { continue };
-                    let was_taken = std::mem::replace(&mut taken, pending.taken);
-                    let first = pending.taken && !was_taken;
-                    if was_taken && !pending.taken {
-                        let _ = self.say(format_args!(
-                            "{name}: a run command came behind the stop: the drive shows {}, and it is sent again", self.status()
-                        ));
-                    }
-                    if pending.alarm && !std::mem::replace(&mut is_alarm, pending.alarm) {
-                        output::complain(format_args!(
-                            "{UNCONFIRMED}. {name}: the drive shows {}; it is waited for all the same", self.status()
-                        ));
-                    }
-                    if first {
-                        self.tell_what_it_took().await;
-                        // A reader who went away ends no stop.
-                        let _ = self.say(format_args!(
-                            "{name} is stopping ({} stop): the drive shows {}", pending.mode, self.status()
-                        ));
+                    let status = self.status();
+                    for news in course.look(pending, status.motion) {
+                        match news {
+                            News::Restarted => self.say_restarted(&status),
+                            News::Alarm => self.complain(format_args!(
+                                "{UNCONFIRMED}. {name}: the drive shows {status}; it is waited for all the same"
+                            )),
+                            News::Taken => {
+                                self.tell_what_it_took().await;
+                                self.say(format_args!(
+                                    "{name} is stopping ({} stop): the drive shows {status}", pending.mode
+                                ));
+                            }
+                        }
                     }
                 }
-                _ = seconds.tick(), if !taken => {
-                    waited += 1;
+                _ = seconds.tick(), if !course.is_taken() => {
+                    let waited = began.elapsed().as_secs();
                     let sent = match self.handle.snapshot().stop.map_or(0, |stop| stop.attempts) {
                         0 => "not sent yet".to_owned(),
                         1 => "sent 1 time".to_owned(),
                         times => format!("sent {times} times"),
                     };
-                    let _ = self.say(format_args!(
-                        "{name} has not confirmed the stop after {waited} s, {sent}: it goes on"
-                    ));
+                    self.say(format_args!("{name} has not confirmed the stop after {waited} s, {sent}: it goes on"));
                 }
             }
         };
+        *restarts += course.restarts;
         self.tell_what_it_took().await;
         match outcome {
             Outcome::Stopped(modes) => Ok((modes, self.status())),
-            outcome @ Outcome::NotConfirmed(_) if taken => {
+            outcome @ Outcome::NotConfirmed(_) if course.is_taken() => {
                 Err(Failure::Drive(format!("{name} has taken the stop and does not stand: {outcome}")))
             }
             outcome => Err(Failure::Drive(format!("{UNCONFIRMED}. {}", self.failure(&outcome)))),
         }
+    }
+
+    fn say_restarted(&mut self, status: &Status) {
+        let (name, whose) = (self.name, self.of_whom());
+        self.say(format_args!(
+            "{name}: a run command{whose} came behind the stop: the drive shows {status}, and it is sent again"
+        ));
     }
 
     /// Whether nothing can be sent.
@@ -214,17 +326,26 @@ impl Commanded {
         while let Ok(Received::Event(Event { kind, .. })) = timeout(Duration::ZERO, self.events.recv()).await
         {
             if matches!(kind, EventKind::StopModeReplaced { .. } | EventKind::StopTookCommand(_)) {
-                let _ = self.say(format_args!("{}: {kind}", self.name));
+                let name = self.name;
+                self.say(format_args!("{name}: {kind}"));
             }
         }
     }
 
-    fn say(&self, text: fmt::Arguments<'_>) -> Result<(), Failure> {
-        match self.is_quiet {
-            true => output::complain(text),
-            false => output::say(text)?,
+    fn say(&mut self, text: fmt::Arguments<'_>) {
+        if self.is_quiet {
+            return self.complain(text);
         }
-        Ok(())
+        #[cfg(test)]
+        self.said.push((Instant::now(), text.to_string()));
+        // A reader who went away ends no stop.
+        let _ = output::say(text);
+    }
+
+    fn complain(&mut self, text: fmt::Arguments<'_>) {
+        #[cfg(test)]
+        self.said.push((Instant::now(), text.to_string()));
+        output::complain(text);
     }
 
     async fn connected(&mut self) -> Result<(), Failure> {
@@ -291,9 +412,14 @@ fn seen(last: Option<&LastSeen>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use drive_core::{Direction, Frequency, SerialSettings, SlaveAddress, State};
+    use std::sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    };
+
+    use drive_core::{Direction, SerialSettings, SlaveAddress, State};
     use drive_families::{Family, SetUp, simulated};
-    use drive_sim::{SimLine, Wiring};
+    use drive_sim::{Cast, Exception, Model, Observation, Panel, Rules, SimLine, SimSlave, Wiring};
     use drive_testing::witness::Witnesses;
     use tokio::time::sleep;
 
@@ -372,6 +498,128 @@ mod tests {
             sleep(Duration::from_secs(10)).await;
             assert!(!machine.observe().running);
         }
+    }
+
+    /// A drive whose motor its load holds: it does what it is told, and no ramp goes on.
+    struct HeldByItsLoad(Box<dyn Model>, Arc<AtomicBool>);
+
+    impl Model for HeldByItsLoad {
+        fn rules(&self) -> &Rules {
+            self.0.rules()
+        }
+        fn read(&mut self, address: u16) -> Result<u16, Exception> {
+            self.0.read(address)
+        }
+        fn write(&mut self, address: u16, value: u16, cast: Cast) -> Result<(), Exception> {
+            self.0.write(address, value, cast)
+        }
+        fn advance(&mut self, elapsed: Duration) {
+            if !self.1.load(Ordering::Relaxed) {
+                self.0.advance(elapsed);
+            }
+        }
+        fn power(&mut self, on: bool) {
+            self.0.power(on);
+        }
+        fn trip(&mut self, code: u16) {
+            self.0.trip(code);
+        }
+        fn set_load(&mut self, percent: u16) {
+            self.0.set_load(percent);
+        }
+        fn panel(&mut self, action: Panel) {
+            self.0.panel(action);
+        }
+        fn observe(&self) -> Observation {
+            self.0.observe()
+        }
+        fn peek(&self, address: u16) -> Option<u16> {
+            self.0.peek(address)
+        }
+        fn poke(&mut self, address: u16, value: u16) -> bool {
+            self.0.poke(address, value)
+        }
+        fn other(&mut self, request: &[u8]) -> Result<Vec<u8>, Exception> {
+            self.0.other(request)
+        }
+    }
+
+    /// An Altivar 312 whose motor runs, seen by whoever has not started it; and whether its load holds the motor.
+    async fn running_312() -> (Commanded, SimSlave, Arc<AtomicBool>) {
+        let settings: SerialSettings = Family::ATV312.capabilities().factory;
+        let simulated = SimLine::new(Wiring::rtu(settings));
+        let is_held = Arc::new(AtomicBool::new(false));
+        let model = simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap();
+        let machine = simulated.add_boxed(1, Box::new(HeldByItsLoad(model, Arc::clone(&is_held)))).unwrap();
+        let config = LineConfig { offline_after: 0, ..LineConfig::stream(settings) };
+        let line = Line::over(simulated.in_memory(), config.clone());
+        let name = DriveName { family: Family::ATV312, slave: SlaveAddress::try_from(1).unwrap() };
+        let mut one = Commanded::over(name, line, config, &simulated::options(), Vec::new()).unwrap();
+        one.command(async |drive| drive.set_setpoint(Frequency::from_hertz(20)).await).await.unwrap();
+        one.start(async |drive| drive.start(Direction::Forward).await).await.unwrap();
+        machine.wait_until(|seen| seen.output_frequency == 2_000).await;
+        one.has_started = false;
+        (one, machine, is_held)
+    }
+
+    fn times(one: &Commanded, what: &str) -> Vec<Instant> {
+        one.said.iter().filter(|(_, text)| text.contains(what)).map(|(at, _)| *at).collect()
+    }
+
+    /// Another master climbs the chart and starts the motor: 0006h, 0007h, 000Fh (BBV51701, "CMD"), after a second and so often, with so
+    /// much between.
+    fn start_by_another(machine: &SimSlave, often: u32, every: Duration) {
+        let machine = machine.clone();
+        tokio::spawn(async move {
+            sleep(SECOND).await;
+            for _ in 0..often {
+                for word in [0x0006, 0x0007, 0x000F] {
+                    machine.written_by_another(8_501, word).unwrap();
+                }
+                sleep(every).await;
+            }
+        });
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_its_load_holds_though_the_drive_has_taken_the_stop_is_an_alarm_after_ten_seconds() {
+        let (mut one, _machine, is_held) = running_312().await;
+        is_held.store(true, Ordering::Relaxed);
+        let began = Instant::now();
+        let failure = one.stop(StopMode::Ramp).await.unwrap_err().to_string();
+        assert!(failure.contains("has taken the stop and does not stand"), "{failure}");
+        let [at] = times(&one, UNCONFIRMED)[..] else { panic!("{:?}", one.said) };
+        let after = at - began;
+        assert!((10 * SECOND..11 * SECOND).contains(&after), "{after:?}");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_run_command_that_comes_behind_a_stop_is_told_and_so_it_is_in_the_verdict() {
+        let (mut one, machine, _) = running_312().await;
+        start_by_another(&machine, 1, SECOND);
+        let stop = one.stop(StopMode::Ramp).await.unwrap();
+        assert_eq!((stop.restarts, times(&one, "a run command from somebody else").len()), (1, 1));
+        assert!(!machine.observe().running);
+    }
+
+    /// A programmable controller that writes its run word by its cycle.
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_somebody_else_starts_again_and_again_behind_its_stop_is_not_told_as_stopped() {
+        for every in [SECOND, 3 * SECOND] {
+            let (mut one, machine, _) = running_312().await;
+            // ACC of 0.1 s (BBV51701): at its reference before the next status, it is not seen to speed up.
+            assert!(machine.poke(9_001, 1));
+            start_by_another(&machine, 60, every);
+            let failure = one.stop(StopMode::Ramp).await.unwrap_err().to_string();
+            assert!(failure.contains("run command"), "{every:?}: {failure}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn direct_current_that_is_ended_at_standstill_is_no_run_command_of_somebody_else() {
+        let (mut one, _machine, _) = running_312().await;
+        let stop = one.stop(StopMode::DcInjection).await.unwrap();
+        assert_eq!((stop.restarts, times(&one, "a run command").len()), (0, 0), "{:?}", one.said);
     }
 
     #[tokio::test(start_paused = true)]

@@ -8,10 +8,10 @@ use std::{
 use drive_bus::{Endpoint, Line, LineConfig};
 use drive_core::{Drive, Error, Recognised, Row, Status, Written};
 use drive_families::Options;
-use drive_fleet::{Order, Refused, Started, StopModes, view::StopModesView};
+use drive_fleet::{Order, Refused, Started, view::StopModesView};
 use serde_json::json;
 
-use crate::commanded::Commanded;
+use crate::commanded::{Commanded, Stop};
 use drived_client::{
     self as client, self, Daemon, DaemonArgs, Target, Told,
     own_line::{close, may_have_written, open_drive, open_line_of, wait_at_most, words},
@@ -148,17 +148,24 @@ impl OneDriveArgs {
     }
 
     /// The same for a stop, with how it was asked for and how the drive has stopped.
-    pub fn say_stopped(&self, one: &Commanded, stop: StopModes, status: &Status) -> Result<(), Failure> {
-        let name = one.name;
-        let by = if stop.is_told() { format!(", {stop}") } else { String::new() };
+    pub fn say_stopped(&self, one: &Commanded, stop: &Stop) -> Result<(), Failure> {
+        let (name, Stop { modes, status, restarts }) = (one.name, stop);
+        let by = if modes.is_told() { format!(", {modes}") } else { String::new() };
         let mut body = json!({
-            "drive": name.to_string(), "action": "stop", "outcome": "confirmed", "stop": StopModesView::from(stop), "status": status,
+            "drive": name.to_string(), "action": "stop", "outcome": "confirmed", "stop": StopModesView::from(*modes), "status": status,
         });
-        if stop.is_told() {
-            body["text"] = json!(stop.to_string());
+        if modes.is_told() {
+            body["text"] = json!(modes.to_string());
+        }
+        let mut behind = "";
+        if *restarts > 0 {
+            body["restarts"] = json!(restarts);
+            behind = ", and was started again by somebody else while it stopped";
         }
         let stopped = values::stopped(Some(status));
-        self.daemon.say(&body, || output::say(format_args!("{name} {stopped}{by}: the drive shows {status}")))
+        self.daemon.say(&body, || {
+            output::say(format_args!("{name} {stopped}{by}{behind}: the drive shows {status}"))
+        })
     }
 
     /// [`command`](Self::command) for a stop, which is sent as soon as the port can be opened.

@@ -10,7 +10,7 @@ use drive_profile::format::Reached;
 use tokio::time::{Instant, sleep};
 
 use drived_client::own_line::{open_drive, wait_at_most, words};
-use drived_tools::commanded::Commanded;
+use drived_tools::commanded::{Commanded, Stop};
 use drived_words::{
     drive_spec::DriveName,
     failure::Failure,
@@ -129,8 +129,7 @@ impl Steps {
         let mut drive = self.drive();
         let turned = drive.status().await.map_err(|error| self.failed(&error))?.motion == Motion::Driven;
         let mut one = self.commanded()?;
-        let stopped = one.stop(StopMode::Ramp).await;
-        let (modes, status) = stopped?;
+        let Stop { modes, status, .. } = one.stop(StopMode::Ramp).await?;
         console.say(format_args!("the stop is confirmed ({modes}): the drive shows {status}"))?;
         self.agreed(console, "Does the motor stand?").await?;
         Ok(match turned {
@@ -175,9 +174,9 @@ impl Steps {
             () = one.asked_to_end() => Err(asked_to_end()),
             turns = console.agrees("Does the motor turn slowly, forward?") => turns,
         };
-        let (_, stopped) = one.stop(StopMode::Ramp).await?;
+        let Stop { status, .. } = one.stop(StopMode::Ramp).await?;
         said?;
-        console.say(format_args!("stopped: the drive shows {stopped}"))?;
+        console.say(format_args!("stopped: the drive shows {status}"))?;
         if !turns? {
             return Err(not_right());
         }

@@ -59,7 +59,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     }
     let mut one = args.one.stop()?;
     match one.stop(order).await {
-        Ok((stop, status)) => args.one.say_stopped(&one, stop, &status)?,
+        Ok(stop) => args.one.say_stopped(&one, &stop)?,
         Err(failure) => {
             // Whoever else has the port open is in nobody's way where the drive has answered.
             let whose = if one.is_unsent() { args.one.whose().await } else { None };
