@@ -292,13 +292,15 @@ impl StatusWords {
 
     /// Whether a drive that shows these words can still hold `command`. A chart that has left operation enabled holds no
     /// run command, whatever was written before; nor is one in force again by itself when somebody else gives control
-    /// back. And a motor that speeds up was given another word than a stop.
+    /// back. And a motor that speeds up, or turns at its reference, was given another word than a stop.
     #[must_use]
     pub fn can_hold(self, command: ControlWord) -> bool {
         if command.is_run() {
             self.chart() == Some(ChartState::OperationEnabled) && self.control() == Control::Bus
         } else {
-            !(command.is_stop() && self.is_turning() && self.eti.contains(ExtendedStatus::ACCELERATING))
+            let at_reference = self.eta.contains(StatusWord::REFERENCE_REACHED) && !self.is_stopping();
+            let is_driven = at_reference || self.eti.contains(ExtendedStatus::ACCELERATING);
+            !(command.is_stop() && self.is_turning() && is_driven)
         }
     }
 
@@ -588,6 +590,8 @@ mod tests {
         let held = |eta, eti| [run, stop, quick].map(|word| StatusWords::new(eta, eti).can_hold(word));
         assert_eq!(held(0x0227, 0x4210), [true, false, true], "speeding up");
         assert_eq!(held(0x0227, 0x4410), [true; 3], "slowing down");
+        assert_eq!(held(0x0627, 0x4010), [true, false, true], "at its reference");
+        assert_eq!(held(0x0627, 0x4030), [true; 3], "braked by direct current");
         assert_eq!(held(0x0223, 0x4000), [false, true, true], "switched on");
         assert_eq!(held(0x0027, 0x4010), [false, true, true], "forced local");
         assert_eq!(held(0x0227, 0x0010), [false, true, true], "by the terminals");

@@ -341,6 +341,19 @@ async fn a_motor_that_another_master_starts_again_behind_a_stop_is_called_runnin
     assert_eq!(drive.status().await.unwrap().state, State::Running, "also when it speeds up no more");
 }
 
+/// ETA bit 10, "reference reached (steady state)" (BBV51701 p. 13), and ACC of 0.1 s: no status has shown that it speeds up.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_is_at_its_reference_again_before_the_next_status_is_called_running_behind_a_stop() {
+    let (mut drive, machine, line) = running().await;
+    assert!(machine.poke(9_001, 1));
+    assert_eq!(drive.stop(StopMode::Ramp).await.unwrap().status.state, State::Stopping);
+    machine.wait_until(|seen| seen.output_frequency < 3_000).await;
+    bench::write(&line, 8501, 0x000F).await;
+    machine.wait_until(|seen| seen.output_frequency == 5_000).await;
+    let status = drive.status().await.unwrap();
+    assert_eq!((status.state, status.motion), (State::Running, Motion::Driven));
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_stop_that_does_not_show_is_tried_without_the_old_settings_the_next_time() {
     let (mut drive, machine, _line) = running().await;
