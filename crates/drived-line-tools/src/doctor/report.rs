@@ -261,6 +261,7 @@ const fn title(defect: Defect) -> &'static str {
         Defect::LateAnswers => "LATE ANSWERS",
         Defect::SlowDrive => "A SLOW DRIVE",
         Defect::Noise => "NOISE",
+        Defect::Interrupted => "NOTHING COMES FOR SOME TIME",
         Defect::FarEndFaster => "THE FAR END IS FASTER THAN ITS SPEED",
         Defect::FirstByteCut => "ANSWERS LACK THEIR FIRST BYTE",
         Defect::LastByteCut => "ANSWERS LACK THEIR LAST BYTE",

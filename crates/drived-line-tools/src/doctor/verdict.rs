@@ -23,6 +23,7 @@ pub(super) enum Defect {
     LateAnswers,
     SlowDrive,
     Noise,
+    Interrupted,
     FarEndFaster,
     FirstByteCut,
     LastByteCut,

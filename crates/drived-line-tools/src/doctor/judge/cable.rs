@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, time::Duration};
 
 use drive_bus::listen::Role;
 
-use super::{Case, FEW, is_times, share};
+use super::{Case, FEW, gaps::Gap, is_times, share};
 use crate::doctor::{
     observations::Asked,
     verdict::{Certainty, Defect, Verdict},
@@ -100,10 +100,15 @@ pub(super) fn damaged_alone(case: &Case<'_>, slave: u8) -> Option<Verdict> {
     ))
 }
 
-/// Failures that come to everybody, whoever runs.
-pub(super) fn noise(case: &Case<'_>, explained: &[u8]) -> Option<Verdict> {
-    let left = case.there().filter(|figures| !explained.contains(&figures.slave));
-    let lost = left.fold((0, 0), |(bad, asked), figures| (bad + figures.bad(), asked + figures.asked));
+/// Failures that come to everybody, whoever runs, and outside of the gaps.
+pub(super) fn noise(case: &Case<'_>, explained: &[u8], gaps: &[Gap]) -> Option<Verdict> {
+    let left: Vec<u8> = case.there().map(|figures| figures.slave).collect();
+    let is_left = |asked: &&Asked| {
+        left.contains(&asked.slave)
+            && !explained.contains(&asked.slave)
+            && !gaps.iter().any(|gap| gap.holds(asked))
+    };
+    let lost = failed(case.seen.asked.iter().filter(is_left));
     let (noisy, pieces) = at_rest(case);
     let is_lost = lost.0 > FEW && lost.0 * 33 >= lost.1;
     let is_heard = noisy >= 8 && noisy * 100 >= pieces;

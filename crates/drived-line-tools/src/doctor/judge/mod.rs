@@ -5,6 +5,7 @@
 
 mod address;
 mod cable;
+mod gaps;
 mod heard;
 mod masters;
 mod timing;
@@ -79,7 +80,8 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
         let found = timing::needs_pause(&case, slave)
             .or_else(|| cable::interference(&case, slave))
             .or_else(|| heard::two(&case, slave))
-            .or_else(|| cable::damaged_alone(&case, slave).filter(|_| !is_disturbed || figures.silent > FEW));
+            .or_else(|| cable::damaged_alone(&case, slave).filter(|_| !is_disturbed || figures.silent > FEW))
+            .or_else(|| gaps::one(&case, slave).filter(|_| !is_disturbed));
         of_one(found, &mut explained);
     }
     let held = timing::adapter(&case);
@@ -90,7 +92,9 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
         of_one(timing::late(&case, &explained), &mut Vec::new());
         of_one(timing::slow(&case, is_held), &mut Vec::new());
         if !is_disturbed {
-            of_one(cable::noise(&case, &explained), &mut Vec::new());
+            let gaps = gaps::of_all(&case, &explained);
+            of_one(gaps::line(&case, &gaps), &mut Vec::new());
+            of_one(cable::noise(&case, &explained, &gaps), &mut Vec::new());
         }
     }
     verdicts

@@ -82,6 +82,57 @@ async fn a_line_that_is_silent_from_the_eighth_second_is_no_noise() {
     assert_eq!(kinds(&silent), [Defect::FellSilent], "{}", told(&silent));
 }
 
+fn judged(seen: &Observations) -> Vec<(Defect, Vec<u8>)> {
+    defects(&judge(seen))
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_line_that_is_cut_once_for_some_seconds_is_no_noise() {
+    let cut = seen(
+        |at, said| {
+            if (8 * SECOND..12 * SECOND).contains(&at) {
+                said.clear();
+            }
+        },
+        20 * SECOND,
+    )
+    .await;
+    assert_eq!(judged(&cut), [(Defect::Interrupted, vec![])], "{}", told(&cut));
+    let verdict = &judge(&cut)[0];
+    let steps = verdict.next.concat();
+    assert!(verdict.finding.contains("once, for 4"), "{}", verdict.finding);
+    assert!(!steps.contains("120") && steps.contains("plug"), "{steps}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drive_without_contact_a_quarter_of_the_time_is_not_healthy() {
+    let loose = seen(
+        |at, said| {
+            if said.first() == Some(&2) && at.as_millis() % 6_000 < 1_500 {
+                said.clear();
+            }
+        },
+        20 * SECOND,
+    )
+    .await;
+    assert_eq!(judged(&loose), [(Defect::Interrupted, vec![2])], "{}", told(&loose));
+}
+
+#[tokio::test(start_paused = true)]
+async fn bursts_that_destroy_everything_for_a_seventh_of_the_time_are_not_healthy() {
+    let bursts = seen(
+        |at, said| {
+            if at.as_millis() % 5_000 < 700 {
+                said.fill(0x55);
+            }
+        },
+        20 * SECOND,
+    )
+    .await;
+    assert_eq!(judged(&bursts), [(Defect::Noise, vec![])], "{}", told(&bursts));
+    assert!(judge(&bursts)[0].finding.contains("bursts"), "{}", judge(&bursts)[0].finding);
+}
+
 /// One that refuses everything, for another reason each.
 async fn refused(code: u8) -> Observations {
     let bench = Bench::of(&[Family::ATV312]);
