@@ -99,12 +99,13 @@ pub(super) fn line(case: &Case<'_>, gaps: &[Gap]) -> Option<Verdict> {
     })
 }
 
-/// One slave, where the others answer meanwhile.
-pub(super) fn one(case: &Case<'_>, slave: u8) -> Option<Verdict> {
+/// One slave outside of the gaps of all, where the others answer meanwhile.
+pub(super) fn one(case: &Case<'_>, slave: u8, of_all: &[Gap]) -> Option<Verdict> {
     if case.is_shared || case.there().count() < 2 || !case.figures(slave)?.is_there() {
         return None;
     }
-    let gaps = gaps(case.seen.of(slave));
+    let is_his = |asked: &&Asked| !of_all.iter().any(|gap| gap.holds(asked));
+    let gaps = gaps(case.seen.of(slave).filter(is_his));
     let (first, last) = (case.seen.of(slave).next()?, case.seen.of(slave).last()?);
     let when = told(&gaps, last.ended.saturating_sub(first.began))?;
     let others = || case.seen.asked.iter().filter(|asked| asked.slave != slave);

@@ -72,6 +72,7 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
     let is_doubled = case.figures.iter().any(|figures| heard::two(&case, figures.slave).is_some());
     // So does one that acknowledges when another is asked.
     let is_disturbed = is_doubled || is_late_link;
+    let gaps = if is_disturbed || is_shared { Vec::new() } else { gaps::of_all(&case, &explained) };
     for figures in &case.figures {
         let slave = figures.slave;
         if explained.contains(&slave) {
@@ -81,7 +82,7 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
             .or_else(|| cable::interference(&case, slave))
             .or_else(|| heard::two(&case, slave))
             .or_else(|| cable::damaged_alone(&case, slave).filter(|_| !is_disturbed || figures.silent > FEW))
-            .or_else(|| gaps::one(&case, slave).filter(|_| !is_disturbed));
+            .or_else(|| gaps::one(&case, slave, &gaps).filter(|_| !is_disturbed));
         of_one(found, &mut explained);
     }
     let held = timing::adapter(&case);
@@ -92,7 +93,6 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
         of_one(timing::late(&case, &explained), &mut Vec::new());
         of_one(timing::slow(&case, is_held), &mut Vec::new());
         if !is_disturbed {
-            let gaps = gaps::of_all(&case, &explained);
             of_one(gaps::line(&case, &gaps), &mut Vec::new());
             of_one(cable::noise(&case, &explained, &gaps), &mut Vec::new());
         }

@@ -88,20 +88,22 @@ fn judged(seen: &Observations) -> Vec<(Defect, Vec<u8>)> {
 
 #[tokio::test(start_paused = true)]
 async fn a_line_that_is_cut_once_for_some_seconds_is_no_noise() {
-    let cut = seen(
-        |at, said| {
-            if (8 * SECOND..12 * SECOND).contains(&at) {
-                said.clear();
-            }
-        },
-        20 * SECOND,
-    )
-    .await;
-    assert_eq!(judged(&cut), [(Defect::Interrupted, vec![])], "{}", told(&cut));
-    let verdict = &judge(&cut)[0];
-    let steps = verdict.next.concat();
-    assert!(verdict.finding.contains("once, for 4"), "{}", verdict.finding);
-    assert!(!steps.contains("120") && steps.contains("plug"), "{steps}");
+    for from in (8_000..9_000).step_by(100).map(Duration::from_millis) {
+        let bench = Bench::of(&[Family::ATV312; 3]);
+        let line = bench.line.clone();
+        tokio::spawn(async move {
+            sleep(from).await;
+            line.cut();
+            sleep(4 * SECOND).await;
+            line.join();
+        });
+        let cut = bench.seen(20 * SECOND).await;
+        assert_eq!(judged(&cut), [(Defect::Interrupted, vec![])], "{from:?}: {}", told(&cut));
+        let verdict = &judge(&cut)[0];
+        let steps = verdict.next.concat();
+        assert!(verdict.finding.contains("once, for 4"), "{}", verdict.finding);
+        assert!(!steps.contains("120") && steps.contains("plug"), "{steps}");
+    }
 }
 
 #[tokio::test(start_paused = true)]
