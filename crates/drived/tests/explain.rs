@@ -101,7 +101,7 @@ fn the_frames_of_the_altivar_312_say_what_its_manual_says_of_them() {
             ),
             // p. 14 and 15 print the forms of the refusals without an example: the "Object Id" is incorrect, and a register
             // that does not exist.
-            ("02 2B 0E 01 09", "02 AB 0E 02", "asks who it is", "exception 02h"),
+            ("02 2B 0E 01 09", "02 AB 0E 02", "asks who it is", "error 02h: the object id is incorrect"),
             ("02 03 0C81 001E", "02 83 03", "reads ETA", "exception 03h"),
         ],
     );
@@ -463,6 +463,23 @@ fn what_is_wrong_is_said_and_counted() {
         "! silence before it 1.01 ms, 3.5 characters are 2.00 ms",
         "4 requests, 0 answers, 0 exceptions, 4 without an answer, 1 damaged, 1 silences too short",
     ] {
+        assert!(said.contains(part), "{part} does not stand in\n{said}");
+    }
+}
+
+/// A response's function is the request's + 80h (BBV52816 p. 15): it is known without the request.
+#[test]
+fn a_refusal_whose_question_is_not_there_is_one_all_the_same() {
+    let said = run(&["explain", "--drive", "atv312@3", "03 83 02 61 31"]).assert_done().to_owned();
+    for part in ["refuses the function 03h, read registers", "! exception 02h", "1 exceptions"] {
+        assert!(said.contains(part), "{part} does not stand in\n{said}");
+    }
+    let frames =
+        [(Direction::Received, 0, frame("04 90 22")), (Direction::Received, 1_000, frame("02 AB 0E 01"))];
+    let said = Capture::new("alone", Dissector::Rtu, &frames).explained(&["--trouble"]);
+    for part in
+        ["refuses the function 10h, write registers", "! exception 22h", "ReadDeviceId", "2 exceptions"]
+    {
         assert!(said.contains(part), "{part} does not stand in\n{said}");
     }
 }

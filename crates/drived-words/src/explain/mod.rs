@@ -146,6 +146,10 @@ impl Explainer {
                 Some(false) => self.answer(*slave, pdu),
                 // What has one form for both: nothing is told from it.
                 None => {
+                    if let Some(refusal) = pdu::lone_refusal(pdu) {
+                        self.counts.exceptions += 1;
+                        return refusal;
+                    }
                     let said = Asked::of(pdu).said(self.family(*slave), *slave, &mut self.words);
                     Said { text: format!("{}, or confirms it", said.text), ..said }
                 }
@@ -191,11 +195,13 @@ impl Explainer {
     fn answer(&mut self, slave: u8, pdu: &[u8]) -> Said {
         let family = self.family(slave);
         let Some((expected, asked)) = self.asked.take() else {
-            let said = Asked::of(pdu).said(family, slave, &mut self.words);
+            let refusal = pdu::lone_refusal(pdu);
+            self.counts.exceptions += u64::from(refusal.is_some());
+            let mut said = refusal.unwrap_or_else(|| Asked::of(pdu).said(family, slave, &mut self.words));
             // The request of the first may stand before the capture.
             let is_first = self.counts.requests == 0;
-            let trouble = (!is_first).then(|| "nobody had asked for it".to_owned()).into_iter().collect();
-            return Said { trouble, ..said };
+            said.trouble.extend((!is_first).then(|| "nobody had asked for it".to_owned()));
+            return said;
         };
         if expected != slave {
             let trouble = vec![format!("slave {expected} was asked, not this one")];
@@ -203,9 +209,9 @@ impl Explainer {
             return Said { trouble, ..Said::text(format!("answer of slave {slave}")) };
         }
         let answer = asked.answer(pdu);
-        match answer {
-            pdu::Answer::Exception(_) => self.counts.exceptions += 1,
-            _ => self.counts.answers += 1,
+        match answer.is_refusal() {
+            true => self.counts.exceptions += 1,
+            false => self.counts.answers += 1,
         }
         answer.said(&asked, family, slave, &mut self.words)
     }

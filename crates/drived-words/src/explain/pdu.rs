@@ -11,6 +11,9 @@ use super::{
 /// Set in the function code of an exception.
 const EXCEPTION: u8 = 0x80;
 
+/// Encapsulated interface, by which a device is identified.
+const IDENTIFICATION: u8 = 0x2B;
+
 /// What was asked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Asked {
@@ -38,6 +41,8 @@ pub(super) enum Answer {
     Done,
     Identification(Vec<(u8, String)>),
     Exception(u8),
+    /// The refusal of an identification by its own code (the Altivar 312's Modbus manual, p. 14).
+    NotIdentified(u8),
     Other(Vec<u8>),
     /// It fits no request of this kind.
     Unfitting(&'static str),
@@ -71,13 +76,7 @@ impl Asked {
     pub(super) fn answer(&self, pdu: &[u8]) -> Answer {
         let [function, ref data @ ..] = *pdu else { return Answer::Unfitting("nothing is in it") };
         if function == self.function() | EXCEPTION {
-            // Behind function 2Bh the code stands after the kind of identification (the Altivar 312's Modbus manual, p. 14).
-            let code = if let (Self::Identification { .. }, [0x0E, code]) = (self, data) {
-                Some(*code)
-            } else {
-                data.first().copied()
-            };
-            return code.map_or(Answer::Unfitting("an exception without a code"), Answer::Exception);
+            return Answer::refusal(function, data);
         }
         if function != self.function() {
             return Answer::Unfitting("it has another function than was asked for");
@@ -162,7 +161,40 @@ impl Asked {
     }
 }
 
+/// A refusal whose question is not there: no request has such a function.
+pub(super) fn lone_refusal(pdu: &[u8]) -> Option<Said> {
+    let [function, ref data @ ..] = *pdu else { return None };
+    let refused = function.checked_sub(EXCEPTION)?;
+    let what = format!("function {refused:02X}h, {}", named(refused));
+    Some(Answer::refusal(function, data).refused(&what))
+}
+
 impl Answer {
+    fn refusal(function: u8, data: &[u8]) -> Self {
+        match *data {
+            [0x0E, code] if function == IDENTIFICATION | EXCEPTION => Self::NotIdentified(code),
+            [code, ..] => Self::Exception(code),
+            [] => Self::Unfitting("an exception without a code"),
+        }
+    }
+
+    pub(super) const fn is_refusal(&self) -> bool {
+        matches!(self, Self::Exception(_) | Self::NotIdentified(_))
+    }
+
+    /// A refusal of this.
+    fn refused(&self, what: &str) -> Said {
+        let trouble = match self {
+            Self::Exception(code) => {
+                let meaning = ExceptionMeaning::standard(*code);
+                format!("exception {code:02X}h: {meaning}")
+            }
+            Self::NotIdentified(code) => format!("error {code:02X}h: {}", unidentified(*code)),
+            _ => "it has no code".to_owned(),
+        };
+        Said::trouble(format!("refuses the {what}"), trouble)
+    }
+
     pub(super) fn said(&self, asked: &Asked, family: Option<Family>, slave: u8, seen: &mut Words) -> Said {
         match self {
             Self::Words { first, words } => written("answers", family, slave, &run(*first, words), seen),
@@ -172,11 +204,7 @@ impl Answer {
                     texts.iter().map(|(object, text)| format!("{}: {text}", part(*object))).collect();
                 Said::text(format!("is {}", texts.join(", ")))
             }
-            Self::Exception(code) => {
-                let meaning = ExceptionMeaning::standard(*code);
-                let trouble = vec![format!("exception {code:02X}h: {meaning}")];
-                Said { trouble, ..Said::text(format!("refuses the {}", asked.short())) }
-            }
+            Self::Exception(_) | Self::NotIdentified(_) => self.refused(&asked.short()),
             Self::Other(data) => Said::text(format!("answers {}", hex(data))),
             Self::Unfitting(why) => Said {
                 trouble: vec![(*why).to_owned()],
@@ -249,6 +277,16 @@ fn texts(mut objects: &[u8]) -> Vec<(u8, String)> {
         objects = rest;
     }
     found
+}
+
+/// Why an identification is refused (the Altivar 312's Modbus manual, p. 14).
+const fn unidentified(code: u8) -> &'static str {
+    match code {
+        0 => "no error",
+        1 => "the request code, the type of MEI or the ReadDeviceId is incorrect",
+        2 => "the object id is incorrect",
+        _ => "not known here",
+    }
 }
 
 /// What an object of an identification is (section 6.21).
