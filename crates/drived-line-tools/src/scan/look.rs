@@ -7,7 +7,7 @@ use drive_bus::{
     evidence::{Defect, Fact, Finding, What},
     record::Ending,
 };
-use drive_core::{Drive, Error, Identity, PortError, Recognised, SlaveAddress, Watchdog};
+use drive_core::{Drive, Error, ExceptionMeaning, Identity, PortError, Recognised, SlaveAddress, Watchdog};
 use drive_families::Family;
 use tokio::time::Instant;
 
@@ -158,19 +158,34 @@ pub(super) async fn identity(at: At<'_>, family: Family) -> Looks<(Likeness, Opt
     if matches!(recognised, Recognised::NotMine { .. }) {
         return Looks::Unlike;
     }
-    Looks::Like((likeness(family, identity), watchdog(&mut *drive).await))
+    let likeness = likeness(family, identity);
+    // Zeros and numbers look like words of a status: who has not told his name has what his family's manual says that he answers.
+    if !likeness.certain && drive.keep_alive().await.is_err_and(|error| is_lacking(&error)) {
+        return Looks::Unlike;
+    }
+    match watchdog(&mut *drive).await {
+        Err(()) if !likeness.certain => Looks::Unlike,
+        watchdog => Looks::Like((likeness, watchdog.ok().flatten())),
+    }
 }
 
-/// How its watchdog is set. One answer that does not come says nothing of it.
-async fn watchdog(drive: &mut dyn Drive) -> Option<Watchdog> {
+/// How its watchdog is set; an error: it has not what its manual has. One answer that does not come says nothing of it.
+async fn watchdog(drive: &mut dyn Drive) -> Result<Option<Watchdog>, ()> {
     for _ in 0..WATCHDOG {
         match drive.watchdog().await {
-            Ok(watchdog) => return Some(watchdog),
+            Ok(watchdog) => return Ok(Some(watchdog)),
             Err(Error::Port { .. }) => {}
+            Err(error) if is_lacking(&error) => return Err(()),
             Err(_) => break,
         }
     }
-    None
+    Ok(None)
+}
+
+/// Whether the slave has no such function or register.
+const fn is_lacking(error: &Error) -> bool {
+    use ExceptionMeaning::{NoSuchFunction, NoSuchRegister};
+    matches!(error, Error::Exception { meaning: NoSuchFunction | NoSuchRegister, .. })
 }
 
 /// Reads what two drives alike differ in, if in anything: voltages, temperatures, hours.

@@ -1,6 +1,6 @@
 //! Lines with one drive at each address, on which nobody is named twice.
 
-use drive_sim::{Defects, Noise, SecondMaster};
+use drive_sim::{Cast, Defects, Exception, Model, Noise, Observation, Panel, Rules, SecondMaster};
 
 use super::{two::verdict, *};
 use crate::testing::{Change, Through};
@@ -75,6 +75,64 @@ async fn a_byte_that_is_cut_is_no_second_drive() {
         let finds = through(change).await;
         let [Find { answer: Answer::Damaged(why), .. }] = &finds[..] else { panic!("{world}: {finds:?}") };
         assert!(why.contains(world), "{why}");
+    }
+}
+
+/// An energy meter: 03 and 04 in registers 0 to 199, exception 02 above and 01 for every function but these, or but these and 08.
+struct Meter(Rules);
+
+impl Meter {
+    const fn new(diagnostics: &'static [u16]) -> Self {
+        Self(Rules {
+            read_holding: 125,
+            read_input: 125,
+            write_single: false,
+            write_multiple: 0,
+            diagnostics,
+            event_counter: false,
+            broadcast: &[],
+            turnaround: Duration::from_millis(5),
+        })
+    }
+}
+
+impl Model for Meter {
+    fn rules(&self) -> &Rules {
+        &self.0
+    }
+    fn read(&mut self, address: u16) -> Result<u16, Exception> {
+        // Floats of 230 V.
+        let word = if address.is_multiple_of(2) { 0x4366 } else { 0x8000 };
+        if address < 200 { Ok(word) } else { Err(Exception::ILLEGAL_ADDRESS) }
+    }
+    fn write(&mut self, _: u16, _: u16, _: Cast) -> Result<(), Exception> {
+        Err(Exception::ILLEGAL_FUNCTION)
+    }
+    fn advance(&mut self, _: Duration) {}
+    fn power(&mut self, _: bool) {}
+    fn trip(&mut self, _: u16) {}
+    fn set_load(&mut self, _: u16) {}
+    fn panel(&mut self, _: Panel) {}
+    fn observe(&self) -> Observation {
+        Observation::default()
+    }
+    fn peek(&self, _: u16) -> Option<u16> {
+        None
+    }
+    fn poke(&mut self, _: u16, _: u16) -> bool {
+        false
+    }
+}
+
+/// A 3G3EV has the loop-back of function 08 (its manual, §4.1) and n01 to n68 at 0101h and on (§2.1).
+#[tokio::test(start_paused = true)]
+async fn an_energy_meter_is_no_3g3ev() {
+    for diagnostics in [&[][..], &[0]] {
+        let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
+        simulated.add_boxed(6, Box::new(Meter::new(diagnostics))).unwrap();
+        let finds = scanned(&simulated, &at_one("19200 8N1", 5..=7)).await;
+        let [Find { answer: Answer::Slave(alike), .. }] = &finds[..] else { panic!("{finds:?}") };
+        assert_eq!(alike[..], [], "{diagnostics:?}");
     }
 }
 
