@@ -555,7 +555,8 @@ mod tests {
         let line = Line::over(simulated.in_memory(), config.clone());
         let name = DriveName { family: Family::ATV312, slave: SlaveAddress::try_from(1).unwrap() };
         let mut one = Commanded::over(name, line, config, &simulated::options(), Vec::new()).unwrap();
-        one.command(async |drive| drive.set_setpoint(Frequency::from_hertz(20)).await).await.unwrap();
+        let setpoint = Frequency::from_hertz(20);
+        assert!(one.command(async |drive| drive.set_setpoint(setpoint).await).await.unwrap().is_confirmed());
         one.start(async |drive| drive.start(Direction::Forward).await).await.unwrap();
         machine.wait_until(|seen| seen.output_frequency == 2_000).await;
         one.has_started = false;

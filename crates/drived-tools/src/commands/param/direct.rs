@@ -1,9 +1,12 @@
 //! The registers of one drive on a line.
 
-use drive_core::{Capabilities, Drive, ErrorKind, Row, registers::Storage};
+use drive_core::{Capabilities, Drive, ErrorKind, Row, Status, Written, registers::Storage};
 use serde_json::json;
 
-use super::shown::{find, value_cells, value_table};
+use super::{
+    rule,
+    shown::{find, value_cells, value_table},
+};
 use crate::one_drive::{OneDrive, OneDriveArgs};
 use drived_client::own_line::told;
 use drived_file::ledger::LedgerArgs;
@@ -56,9 +59,7 @@ pub(super) async fn set(
     let mut one = args.open_to_write(ledger).await?;
     let shown = in_units(&mut *one.drive, row).await.map_err(|error| one.failure(&error))?;
     let word = wanted(&shown, value)?;
-    let written = told(name, &mut Ending::listen()?, one.drive.write_parameter(row, word)).await?;
-    one.count_of(row, &written);
-    let written = written.map_err(|error| one.failure(&error))?;
+    let (written, running) = write(&mut one, row, word).await?;
     let what = if written.changed { "is now" } else { "was already" };
     let kept = match written.storage {
         Storage::Volatile => "kept in RAM, lost at power-off",
@@ -75,6 +76,10 @@ pub(super) async fn set(
     body["acts_later"] = json!(later);
     let mut text = vec![format!("{} {} {what} {} ({kept})", one.name, row.code, shown.show(word))];
     text.extend(later.map(|needs| format!("{}: {needs}", row.code)));
+    if let Some(status) = running {
+        body["written_while"] = json!(status);
+        text.push(moved(&status));
+    }
     if save && written.storage == Storage::Eeprom {
         text.push("the write itself has stored it: nothing else was saved".to_owned());
     } else if save {
@@ -93,6 +98,28 @@ pub(super) async fn set(
     args.daemon.say(&body, || text.iter().try_for_each(output::say))?;
     one.close().await;
     Ok(())
+}
+
+/// Writes a register where the manual's rules let it; what a motor that is not at rest was seen to do before.
+async fn write(
+    one: &mut OneDrive,
+    row: &'static Row,
+    word: u16,
+) -> Result<(Written, Option<Status>), Failure> {
+    let capabilities = one.drive.capabilities();
+    rule::held(capabilities, row, word, async |row| one.drive.read_parameter(row).await.ok()).await?;
+    let running = one.drive.status().await.ok().filter(|status| !status.is_undriven());
+    let written = told(one.name, &mut Ending::listen()?, one.drive.write_parameter(row, word)).await?;
+    one.count_of(row, &written);
+    let written = written.map_err(|error| one.failure(&error))?;
+    Ok((written, running.filter(|_| written.changed)))
+}
+
+/// What is told of a write to a motor that was not at rest.
+pub(super) fn moved(before: &Status) -> String {
+    format!(
+        "the motor was not at rest: before it the drive showed {before}. It follows its limits and ramps at once"
+    )
 }
 
 /// Saves the drive's parameters to its EEPROM.
@@ -184,4 +211,31 @@ fn say_values(
         }
         output::say_table(table)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use drive_core::{Direction, Frequency, Motion};
+    use drive_families::{Family, SetUp};
+
+    use super::*;
+    use crate::commands::param::{source::Source, testing::Bench};
+
+    /// LSP ≤ HSP ≤ tFr (BBV51701 p. 27), tFr 60 Hz; a reference of 20 Hz below LSP is followed as LSP.
+    #[tokio::test(start_paused = true)]
+    async fn a_limit_is_written_within_the_manuals_rule_and_with_what_the_motor_did_that_follows_it() {
+        let mut bench = Bench::of(Family::ATV312, SetUp::ForTheBus);
+        let machine = bench.machine.clone();
+        let Source::OnLine(one) = &mut bench.source else { panic!("it is on a line") };
+        let [hsp, lsp] = ["HSP", "LSP"].map(|code| Row::find(one.drive.capabilities().rows, code).unwrap());
+        write(one, hsp, 700).await.unwrap_err();
+        assert_eq!(machine.peek(3_104), Some(500));
+        assert_eq!(write(one, lsp, 10).await.unwrap().1, None, "it stands");
+        one.drive.set_setpoint(Frequency::from_hertz(20).into()).await.unwrap();
+        one.drive.start(Direction::Forward).await.unwrap();
+        let (written, running) = write(one, lsp, 450).await.unwrap();
+        assert!(written.changed);
+        assert_eq!(running.map(|status| status.motion), Some(Motion::Driven));
+        machine.wait_until(|seen| seen.output_frequency == 4_500).await;
+    }
 }

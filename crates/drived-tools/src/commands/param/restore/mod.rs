@@ -4,6 +4,8 @@ mod carry;
 mod plan;
 mod way;
 
+pub(super) use self::way::Way;
+
 use std::path::{Path, PathBuf};
 
 use drive_core::registers::{Change, Part, Restoring};

@@ -11,21 +11,24 @@ use drived_words::registers::brief;
 
 /// The words of a drive between two writes.
 #[derive(Debug, Clone)]
-pub(super) struct Way {
+pub(in crate::commands::param) struct Way {
     capabilities: &'static Capabilities,
     held: BTreeMap<Place, u16>,
 }
 
 impl Way {
-    pub(super) fn of(capabilities: &'static Capabilities, held: impl Iterator<Item = (Place, u16)>) -> Self {
+    pub(in crate::commands::param) fn of(
+        capabilities: &'static Capabilities,
+        held: impl Iterator<Item = (Place, u16)>,
+    ) -> Self {
         Self { capabilities, held: held.collect() }
     }
 
-    pub(super) fn word(&self, place: impl Into<Place>) -> Option<u16> {
+    pub(in crate::commands::param) fn word(&self, place: impl Into<Place>) -> Option<u16> {
         self.held.get(&place.into()).copied()
     }
 
-    pub(super) fn hold(&mut self, place: Place, word: u16) {
+    pub(in crate::commands::param) fn hold(&mut self, place: Place, word: u16) {
         self.held.insert(place, word);
     }
 
@@ -38,12 +41,12 @@ impl Way {
     }
 
     /// A word as a person reads it, in the unit that it has now.
-    pub(super) fn text(&self, row: &Row, word: u16) -> String {
+    pub(in crate::commands::param) fn text(&self, row: &Row, word: u16) -> String {
         brief(&self.capabilities.in_units(row, |address| self.word(address)), word)
     }
 
     /// The registers that have a relation to one of these, themselves left out.
-    pub(super) fn related(&self, addresses: &[u16]) -> Vec<&'static Row> {
+    pub(in crate::commands::param) fn related(&self, addresses: &[u16]) -> Vec<&'static Row> {
         let relations = self.capabilities.restoring.relations.iter();
         let relations = relations
             .filter(|relation| relation.registers.iter().any(|register| addresses.contains(register)));
@@ -53,7 +56,10 @@ impl Way {
     }
 
     /// What does not hold any more, in words, when a word is written, and did before; `None` where nothing is broken by it.
-    pub(super) fn would_break(&self, Change { row, wanted, .. }: &Change) -> Option<String> {
+    pub(in crate::commands::param) fn would_break(
+        &self,
+        Change { row, wanted, .. }: &Change,
+    ) -> Option<String> {
         let mut then = self.clone();
         then.hold(row.place(), *wanted);
         let relations = self.capabilities.restoring.relations.iter();
