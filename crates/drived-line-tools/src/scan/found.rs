@@ -12,8 +12,8 @@ use serde_json::json;
 
 use super::{
     answer::Answer,
-    plan::{Plan, Trial},
-    sweep::Find,
+    plan::{Plan, Step, Trial},
+    sweep::{Find, Tripped},
 };
 use drived_words::{drive_spec::Addresses, failure::Failure, json, output};
 
@@ -75,10 +75,12 @@ impl Finds {
         questions: usize,
         addresses: usize,
         (took, is_whole): (Duration, bool),
+        tripped: &[Tripped],
     ) -> Result<(), Failure> {
         if self.is_json {
+            let tripped: Vec<u8> = tripped.iter().map(|tripped| tripped.step.slave.number()).collect();
             let summary = json!({ "questions": questions, "found": self.all.len(), "milliseconds": json::milliseconds(took),
-                                  "complete": is_whole });
+                                  "complete": is_whole, "tripped": tripped });
             output::say_as_it_is(json::line(&json!({ "summary": summary })))?;
         }
         let asked = output::counted(questions.min(addresses), "address", "addresses");
@@ -93,14 +95,7 @@ impl Finds {
         }
         let answered = self.all.iter().filter(|(_, find)| !matches!(find.answer, Answer::Damaged(_))).count();
         output::say(format_args!("{answered} of {asked} answer"))?;
-        let watched = self.all.iter().filter(|(_, find)| find.found.interval.is_some());
-        let watched: BTreeSet<SlaveAddress> = watched.map(|(_, find)| find.step.slave).collect();
-        if !watched.is_empty() {
-            output::say(format_args!(
-                "{} may trip now that nobody asks any more: the watchdog is armed there, or cannot be read",
-                Addresses(watched.into_iter().collect())
-            ))?;
-        }
+        self.trips(tripped).into_iter().try_for_each(output::say)?;
         for (line, drives) in self.known() {
             let drives = drives
                 .iter()
@@ -108,6 +103,33 @@ impl Finds {
             output::say(format_args!("to go on: drived poll --line {line}{}", drives.collect::<String>()))?;
         }
         Ok(())
+    }
+
+    /// Who has tripped, and who may yet.
+    pub(super) fn trips(&self, tripped: &[Tripped]) -> Vec<String> {
+        let is_tripped = |step: Step| tripped.iter().any(|tripped| tripped.step == step);
+        let slaves = |steps: &mut dyn Iterator<Item = Step>| {
+            let slaves: BTreeSet<SlaveAddress> = steps.map(|step| step.slave).collect();
+            (!slaves.is_empty()).then(|| Addresses(slaves.into_iter().collect()))
+        };
+        let of = |before: bool| {
+            let those = tripped.iter().filter(move |tripped| tripped.before == before);
+            slaves(&mut those.map(|tripped| tripped.step))
+        };
+        let watched =
+            self.all.iter().filter(|(_, find)| find.found.interval.is_some() && !is_tripped(find.step));
+        let [during, before] = [false, true].map(of);
+        let may = slaves(&mut watched.map(|(_, find)| find.step));
+        let during = during.map(|who| {
+            format!("{who} tripped while this scan went on, and not before it: see its display, and whether its watchdog is shorter than told")
+        });
+        let before = before.map(|who| format!("{who} had tripped when it was found"));
+        let may = may.map(|who| {
+            format!(
+                "{who} may trip now that nobody asks any more: the watchdog is armed there, or cannot be read"
+            )
+        });
+        [during, before, may].into_iter().flatten().collect()
     }
 
     /// The addresses of each family that is the only likely one there, by line.

@@ -119,15 +119,15 @@ impl<T> From<Asked<T>> for Looks<T> {
     }
 }
 
-/// Whether a slave can be read as a drive of a family.
-pub(super) async fn status(at: At<'_>, family: Family) -> Looks<()> {
+/// Whether a slave can be read as a drive of a family, and has tripped then.
+pub(super) async fn status(at: At<'_>, family: Family) -> Looks<bool> {
     let At { line, slave, .. } = at;
     let mut drive = family.open(line.slave(slave.number()).until_refused(TELL_TALE), slave);
     own_line::wait_at_most(&mut *drive);
     match often(at, async || drive.status().await).await {
         // What it does not have is not in its status: a drive without a status word is none of the family.
         Asked::Told(status) if !status.is_explained() => Looks::Unlike,
-        Asked::Told(_) => Looks::Like(()),
+        Asked::Told(status) => Looks::Like(status.is_fault()),
         Asked::Refused => Looks::Unlike,
         Asked::Damaged => Looks::Damaged,
     }

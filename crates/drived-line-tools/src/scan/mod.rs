@@ -152,11 +152,19 @@ pub async fn scan(what: &What, save: Option<Save>, is_json: bool) -> Result<(), 
         };
         ended.map(|is_whole| (is_whole, asked))
     };
+    // Whoever asks it to end waits for nothing more.
+    let tripped = match whole {
+        Ok((true, _)) => tokio::select! {
+            tripped = sweep.tripped() => tripped.unwrap_or_default(),
+            () = ending.asked() => Vec::new(),
+        },
+        _ => Vec::new(),
+    };
     let findings = sweep.findings();
     sweep.close().await;
     let (is_whole, asked) = whole?;
     findings.into_iter().for_each(output::complain);
-    finds.conclude(asked, what.addresses.0.len(), (began.elapsed(), is_whole))?;
+    finds.conclude(asked, what.addresses.0.len(), (began.elapsed(), is_whole), &tripped)?;
     match save {
         Some(save) if is_json => save.write(&finds, is_whole).map(drop),
         Some(save) => output::say(save.write(&finds, is_whole)?),

@@ -42,6 +42,8 @@ pub(super) struct Sweep<'a, Open> {
     /// The line as it is open now, and at which of the trials.
     at: Option<(usize, Line)>,
     feeding: Feeding,
+    /// The drives of a known family, and whether each had tripped when it was found.
+    seen: Vec<(Step, Family, bool)>,
     /// The last one that was silent, and those that were when the next was disturbed: by their late answers, may be.
     silent: Option<Step>,
     disturbing: Vec<Step>,
@@ -50,6 +52,14 @@ pub(super) struct Sweep<'a, Open> {
     /// It ends where another master begins to ask meanwhile.
     pub(super) ends_at_another: bool,
     began: Instant,
+}
+
+/// A drive that has tripped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Tripped {
+    pub step: Step,
+    /// It had when it was found.
+    pub before: bool,
 }
 
 /// Somebody who was found.
@@ -70,6 +80,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
             open,
             at: None,
             feeding: Feeding::default(),
+            seen: Vec::new(),
             silent: None,
             disturbing: Vec::new(),
             is_shared: false,
@@ -156,6 +167,20 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
         told.chain(proposal).collect()
     }
 
+    /// Who has tripped by now: each drive of a known family that had not when it was found is looked at once more.
+    pub(super) async fn tripped(&mut self) -> Result<Vec<Tripped>, Failure> {
+        let mut tripped = Vec::new();
+        for (step, family, before) in self.seen.clone() {
+            let is_tripped = before || {
+                let line = self.line_fed_for(step, LOOK).await?;
+                let look = look::status(self.look_at(&line, step), family);
+                self.fed_meanwhile(&line, step.trial, look).await == Looks::Like(true)
+            };
+            tripped.extend(is_tripped.then_some(Tripped { step, before }));
+        }
+        Ok(tripped)
+    }
+
     /// Lets the port go.
     pub(super) async fn close(&mut self) {
         if let Some((_, line)) = self.at.take() {
@@ -200,6 +225,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
     /// Reads whoever answers as each family that can be set so, and says how often he is to be fed.
     async fn recognise(&mut self, step: Step) -> Result<(Answer, Option<Duration>), Failure> {
         let (mut alike, mut intervals, mut is_damaged) = (Vec::new(), Vec::new(), false);
+        let mut trips = Vec::new();
         let mut longest = 0;
         // Those that tell their names come first: whoever has told his is asked for no other's words.
         let mut families = Family::all();
@@ -221,7 +247,7 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
             let looks = self.fed_meanwhile(&line, step.trial, look).await;
             longest = longest.max(look::longest_read(&line, step.slave));
             match looks {
-                Looks::Like(()) => {}
+                Looks::Like(has_tripped) => trips.push((family, has_tripped)),
                 Looks::Unlike => continue,
                 Looks::Damaged => {
                     is_damaged = true;
@@ -254,6 +280,8 @@ impl<'a, Open: AsyncFn(LineConfig) -> Result<Line, Failure>> Sweep<'a, Open> {
         let is_damaged = is_damaged && (!self.is_shared || alike.is_empty());
         let damaged = is_damaged.then(|| "again and again its answers are damaged".to_owned());
         let (answer, unknown) = self.judged(step, alike, damaged).await?;
+        let of_it = trips.into_iter().find(|(family, _)| answer.only() == Some(*family));
+        self.seen.extend(of_it.map(|(family, has_tripped)| (step, family, has_tripped)));
         Ok((answer, interval.or(unknown)))
     }
 

@@ -261,6 +261,38 @@ async fn a_drive_whose_watchdog_is_armed_does_not_trip_while_the_scan_goes_on() 
     assert_only_read(&[drive, other]);
 }
 
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_trips_while_the_scan_goes_on_is_told_as_tripped_and_not_as_one_that_may() {
+    let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
+    let [during, before, never] = [3, 4, 5].map(|address| {
+        simulated.add_boxed(address, simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap()).unwrap()
+    });
+    // SLF, by any cause.
+    let code = Family::ATV312.simulated_trip().unwrap();
+    before.trip(code);
+    let late = during.clone();
+    tokio::spawn(async move {
+        tokio::time::sleep(Duration::from_secs(4)).await;
+        late.trip(code);
+    });
+    let plan = at_one("19200 8N1", 1..=60);
+    let open = async |config: LineConfig| Ok(Line::over(simulated.in_memory_at(config.serial), config));
+    let mut sweep = Sweep::new(&plan, LineConfig::stream(serial("19200 8N1")), WAIT, open);
+    let mut finds = super::found::Finds::on(LineConfig::stream(serial("19200 8N1")), true);
+    let told = |told| match told {
+        Told::Found(find) => finds.note(&plan, find),
+        Told::At { .. } => Ok(()),
+    };
+    sweep.run(|_, _| true, told).await.unwrap();
+    let tripped = sweep.tripped().await.unwrap();
+    let told = finds.trips(&tripped);
+    let [first, second, third] = &told[..] else { panic!("{told:?}") };
+    assert!(first.starts_with("3 tripped while this scan went on"), "{first}");
+    assert!(second.starts_with("4 had tripped when it was found"), "{second}");
+    assert!(third.starts_with("5 may trip now"), "{third}");
+    assert_only_read(&[during, before, never]);
+}
+
 /// BBV51701 p. 17: `ttO` is set from 0.1 s on.
 #[tokio::test(start_paused = true)]
 async fn a_short_watchdog_is_fed_between_the_questions_to_another_slave_and_during_a_silence() {
@@ -278,5 +310,32 @@ async fn a_short_watchdog_is_fed_between_the_questions_to_another_slave_and_duri
         assert_eq!(drive.observe().trip, None, "{} ms", tto * 100);
         tokio::time::sleep(Duration::from_secs(2)).await;
         assert!(drive.observe().trip.is_some(), "it was armed");
+    }
+}
+
+/// Whoever answered and does not any more is asked in vain as often as he is fed: the others' half of their watchdog is theirs all the
+/// same.
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_falls_silent_while_it_is_fed_delays_nobody_elses_feeding() {
+    for tto in [5, 10] {
+        for after in (1_000..4_000).step_by(500).map(Duration::from_millis) {
+            let simulated = SimLine::default();
+            let rows = Family::ATV312.capabilities().rows;
+            let address = rows.iter().find(|row| row.code == "ttO").unwrap().address;
+            let [watched, silent] = [3, 4].map(|slave| {
+                let model = simulated::model(Family::ATV312, SetUp::ForTheBus).unwrap();
+                simulated.add_boxed(slave, model).unwrap()
+            });
+            assert!(watched.poke(address, tto) && silent.poke(address, tto));
+            simulated.add_boxed(8, simulated::model(Family::ATV21, SetUp::Factory).unwrap()).unwrap();
+            let mute = silent.clone();
+            tokio::spawn(async move {
+                tokio::time::sleep(after).await;
+                mute.mute();
+            });
+            let finds = scanned(&simulated, &at_one("19200 8E1", 1..=40)).await;
+            assert!(finds.iter().any(|find| find.step.slave.number() == 3), "{finds:?}");
+            assert_eq!(watched.observe().trip, None, "{} ms, mute after {after:?}", tto * 100);
+        }
     }
 }
