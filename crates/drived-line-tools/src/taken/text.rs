@@ -21,6 +21,9 @@ const LONGEST: usize = 256;
 /// The shortest: address, function, CRC.
 const SHORTEST: usize = 4;
 
+/// The same without the CRC, where a request or an answer says something: the refusal, address, function, code.
+const SHORTEST_UNCHECKED: usize = 3;
+
 /// The frames of a text.
 pub(super) fn read(text: &str, without_check: bool) -> Taken {
     let lines = text.lines().map(|line| line.get(..LONGEST_LINE).unwrap_or(line));
@@ -28,7 +31,11 @@ pub(super) fn read(text: &str, without_check: bool) -> Taken {
         return ascii;
     }
     let runs: Vec<Vec<Run>> = lines.map(runs).collect();
-    let pieces: Vec<Vec<u8>> = runs.iter().flat_map(|runs| frames_of_line(runs)).collect();
+    let shortest = if without_check { SHORTEST_UNCHECKED } else { SHORTEST + 1 };
+    let pieces: Vec<Vec<u8>> = runs.iter().flat_map(|runs| frames_of_line(runs, shortest)).collect();
+    if without_check && pieces.is_empty() {
+        return taken(Heard::of(&pieces, true), vec![NOTHING.to_owned()]);
+    }
     if without_check {
         let framed =
             pieces.iter().filter_map(|piece| Some(rtu::frame(*piece.first()?, piece.get(1..)?).to_vec()));
@@ -82,13 +89,13 @@ fn ascii(text: &str) -> Option<Taken> {
 }
 
 /// What of a line are frames: those whose check fits; where none does, the longest run that may be one.
-fn frames_of_line(runs: &[Run]) -> Vec<Vec<u8>> {
+fn frames_of_line(runs: &[Run], shortest: usize) -> Vec<Vec<u8>> {
     let fitting: Vec<Vec<u8>> = runs.iter().flat_map(|run| fitting(&run.bytes)).collect();
     if !fitting.is_empty() {
         return fitting;
     }
     let longest = runs.iter().filter(|run| run.is_plain).max_by_key(|run| run.bytes.len());
-    longest.filter(|run| run.bytes.len() > SHORTEST).map(|run| run.bytes.clone()).into_iter().collect()
+    longest.filter(|run| run.bytes.len() >= shortest).map(|run| run.bytes.clone()).into_iter().collect()
 }
 
 /// The frames in a run whose check fits, each as long as it can be, one behind the other.

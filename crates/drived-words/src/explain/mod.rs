@@ -142,8 +142,9 @@ impl Explainer {
     fn said(&mut self, content: &Content, sent: Option<bool>) -> Said {
         match content {
             Content::Pdu { slave, pdu } => match sent {
-                Some(true) => self.request(*slave, pdu),
-                Some(false) => self.answer(*slave, pdu),
+                // Where the bytes alone are there, who sent the first is a guess, and no request has the function of a refusal.
+                Some(true) if !pdu::is_refusal(pdu) => self.request(*slave, pdu),
+                Some(_) => self.answer(*slave, pdu),
                 // What has one form for both: nothing is told from it.
                 None => {
                     if let Some(refusal) = pdu::lone_refusal(pdu) {

@@ -161,7 +161,12 @@ impl Asked {
     }
 }
 
-/// A refusal whose question is not there: no request has such a function.
+/// Whether its function is that of a refusal: no request has such a one.
+pub(super) fn is_refusal(pdu: &[u8]) -> bool {
+    pdu.first().is_some_and(|function| function & EXCEPTION != 0)
+}
+
+/// A refusal whose question is not there.
 pub(super) fn lone_refusal(pdu: &[u8]) -> Option<Said> {
     let [function, ref data @ ..] = *pdu else { return None };
     let refused = function.checked_sub(EXCEPTION)?;
