@@ -259,7 +259,8 @@ pub async fn may_start<D: Drivecom>(
     let (slave, command) = (drive.address(), Command::Start(direction));
     let status = drive.read_status(Class::Command).await?;
     // A setpoint changes no speed of a motor that nothing drives: what is not seen at once is judged by its start, and only once.
-    if setpoint.is_some() && status.motion.is_undriven() && status.state != State::Fault {
+    let is_the_buses = status.control.is_none_or(|control| control == Control::Bus);
+    if setpoint.is_some() && status.motion.is_undriven() && status.state != State::Fault && is_the_buses {
         return Ok(());
     }
     let climb = climb_from(drive, direction, setpoint, &status).await?;

@@ -105,7 +105,7 @@ fn a_stop_that_takes_its_time_is_waited_for_without_a_word_of_a_daemon_that_is_s
     // 30 s from 50 Hz.
     daemon.sim.say("atv312@1 set dEC 300", "done");
     daemon.ask(&["start", "pump 1", "--setpoint", "20Hz"]).assert_done();
-    while !daemon.sim.say("atv312@1 show", "output").contains("20.0") {}
+    while !daemon.sim.say("atv312@1 show", "output").contains("output 20.00 Hz") {}
     let stopped = daemon.ask(&["stop", "pump 1"]);
     let out = stopped.assert_done();
     assert!(
