@@ -82,6 +82,7 @@ fn no_cell_that_was_a_find_is_one_again() {
             "an answer that came twice, taken for the next of the same words: the matrix was wrong",
         ),
         ("A:128469787", "an equal stop, confirmed by the answer to the one before it: the matrix was wrong"),
+        ("A:72501572", "a 58 told in force while it came down, whose panel gave back control"),
         (
             "W:177444",
             "a start that was confirmed, and says that this was four seconds ago: the matrix was wrong",
@@ -122,6 +123,14 @@ fn no_story_that_was_a_find_is_one_again() {
         (
             "4.0.0.f70x4.o5",
             "a start that was confirmed four seconds ago, before the process stood still: the judge was wrong",
+        ),
+        (
+            "6.4.0.o6.e4.o7.o9.o7.e1",
+            "a Goodrive that lost its supply behind a stop, seen by a refused setpoint alone: the stories were wrong",
+        ),
+        (
+            "3.3.8.l8.o6.o10.e6.o11.o9.o11",
+            "a 312 behind a gateway that doubles: the wait for the answer that was taken last was forgotten for what was owed",
         ),
         ("8.3.0.o5.l2.o8.e10.o1.l1", "a V20 whose output is cut in a ramp: told at rest at 6.7 Hz"),
     ] {
@@ -169,6 +178,11 @@ fn no_order_of_a_line_that_was_a_find_is_one_again() {
         ("Wire", "famiikjll", "an answer later than its window, which nobody can tell: the model was wrong"),
         ("Wire", "faijdkfhfhfamhjml", "the same of a read of which answers of all lengths are owed"),
         ("Wire", "aheiiijialfmiikmlfccmijiajl", "a late answer whose check ends with 00h"),
+        (
+            "Wire",
+            "afhmimiljafjefilafjchjehmljml",
+            "the answer to an earlier question of a shape that was owed, and taken, once already",
+        ),
         ("Gateway", "aaaaaaaaaaaaaaaaa", "seventeen stops in vain end after 300 s: the model was wrong"),
         ("Gateway", &"a".repeat(60), "the same of sixty"),
     ] {

@@ -77,6 +77,8 @@ impl<C> Master<C> {
                     self.outcomes.push_back((entry.work.caller, outcome));
                 }
                 Err(failure) => {
+                    // It may have been refused for its length.
+                    entry.work.asked_longer |= flight.more > 0 && matches!(failure, Failure::Doubted(_));
                     if entry.terms.class == Class::Stop {
                         // What it waited behind was owed for others, each of which has had its own share.
                         let usual = |sent: Sent| sent.usually_by.saturating_duration_since(flight.started);
