@@ -7,6 +7,7 @@ use std::{
     collections::{BTreeMap, BTreeSet},
     io::Write as _,
     process::{Command, Output, Stdio},
+    time::{Duration, Instant},
 };
 
 use support::{File, Running, Sim, free_port, get, is_there, path, python_with, run};
@@ -104,7 +105,12 @@ fn scraped(text: &str) -> BTreeMap<&str, BTreeSet<&str>> {
 #[test]
 fn programs_of_others_read_the_metrics_of_five_families() {
     let plant = Plant::start("metrics");
-    let text = plant.scrape("text/plain");
+    // Measurements are read behind the first statuses.
+    let until = Instant::now() + Duration::from_secs(30);
+    let mut text = plant.scrape("text/plain");
+    while !text.contains("\ndrived_drive_torque_ratio") && Instant::now() < until {
+        text = plant.scrape("text/plain");
+    }
     for (what, path) in [("alerts", "/alerts.yml"), ("dashboard", "/grafana.json")] {
         let exported = run(&["export", what]);
         let exported = exported.assert_done();
