@@ -91,8 +91,8 @@ pub const INJECTION_AT_MOST: Duration = Duration::from_secs(30);
 /// answers.
 const ROUNDING: u32 = 50;
 
-/// The shortest ramp that these drives have from the factory, in hundredths of a hertz: 50 Hz in 3 s (`dEC`, BBV51701 p. 29; the
-/// Altivar 28 and 58 the same, the Altivar 21 and the 3G3EV 10 s).
+/// The ramp of an Altivar 312 as it leaves the factory, in hundredths of a hertz: 50 Hz in 3 s (`dEC`, BBV51701 p. 39). Of a drive
+/// whose ramp was not seen none shorter is believed, of whatever family.
 const FACTORY_RAMP: (u32, Duration) = (5_000, Duration::from_secs(3));
 
 /// What was last seen of the shaft, or is to be taken for it.

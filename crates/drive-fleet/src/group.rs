@@ -2,7 +2,7 @@
 
 use std::{
     borrow::Cow,
-    collections::HashMap,
+    collections::{HashMap, HashSet},
     convert::identity,
     fmt,
     sync::{
@@ -442,10 +442,10 @@ impl Group {
         }
         // A drive whose start is uncertain is among those that are stopped; not one that this group has not begun, which may be in
         // somebody else's hands. What somebody else is stopping already, and perhaps by its freewheel, is not slowed down by this.
-        let begun = |name: &Arc<str>| {
-            outcomes.iter().any(|(other, outcome)| other == name && outcome.may_have_started())
-        };
-        let members = self.members.iter().filter(|member| begun(member.name())).cloned().collect();
+        let begun = outcomes.iter().filter(|(_, outcome)| outcome.may_have_started());
+        let begun: HashSet<&str> = begun.map(|(name, _)| &**name).collect();
+        let is_begun = |member: &&DriveHandle| begun.contains(&**member.name());
+        let members = self.members.iter().filter(is_begun).cloned().collect();
         let begun = Self::new(self.fleet.clone(), members);
         let stopped = begun.stop_each(StopMode::Ramp.into(), false).finished().await;
         let outcomes =

@@ -80,7 +80,7 @@ async fn each_stop_mode_is_one_write_seen_at_once_and_ends_at_standstill() {
         assert_eq!(status.state, state, "{mode}");
         assert_eq!(commands(&machine).last(), Some(&word), "{mode}");
         assert!(machine.observe().shaft_frequency > 0, "{mode}: a stop takes its time");
-        // A fast stop is told from a cut by looks that see it come down: it is four times as fast as the factory's ramp (dCF, p. 44).
+        // A fast stop is told from a cut by looks that see it come down: it is four times as fast as the factory's ramp (dCF, BBV51701 p. 40).
         machine.wait_until(|seen| seen.shaft_frequency < 4_000).await;
         drive.status().await.unwrap();
         // The injection lasts as long as its bit.
