@@ -173,12 +173,12 @@ impl<T: Record> Records<T> {
         self.lock().drives.iter().filter_map(there).collect()
     }
 
-    /// The stops that were not confirmed, of drives that are not in the configuration: by their places, which drive each is of.
-    pub fn stops_left(&self) -> BTreeMap<Place, String> {
+    /// The records of drives that are not in the configuration: by their places, which drive each is of.
+    pub fn left(&self) -> BTreeMap<Place, (String, T)> {
         let left = |(place, entry): (&Place, &Entry<T>)| {
             let of =
                 entry.name.as_ref().map_or_else(|| place.to_string(), |name| format!("{name} ({place})"));
-            (entry.is_alone && entry.record.stops()).then(|| (place.clone(), of))
+            entry.is_alone.then(|| (place.clone(), (of, entry.record.clone())))
         };
         self.lock().drives.iter().filter_map(left).collect()
     }

@@ -28,10 +28,10 @@ use self::{added::Added, file::File};
 pub use self::{checks::is_one_wire, file::without};
 use drived_config::config::{
     ConfigError, DriveEntry, Entry as _, Environment, Group, Key, LineEntries, LineEntry, LinePart, Members,
-    Source, State, groups, line_part, look_alikes, of,
+    NO_DRIVE, Source, State, groups, line_part, look_alikes, of,
 };
 use drived_config::profiles::{Folder, ProfilesError};
-use drived_doors::config::DoorsConfig;
+use drived_doors::config::{DoorsConfig, Http};
 use drived_face::{Configured, Site, Written};
 use drived_words::failure::Failure;
 
@@ -96,9 +96,20 @@ impl Config {
         }
     }
 
-    /// The same, whose lines can work.
-    pub fn load_to_begin(file: &Path) -> Result<Self, Failure> {
-        Self::load_or_empty(file).and_then(Self::workable).map_err(|error| Failure::Input(error.to_string()))
+    /// The same, whose lines can work: what a daemon begins with, which has drives or a page at which they are added. `http` is said
+    /// beside the file.
+    pub fn load_to_begin(file: &Path, http: Option<Http>) -> Result<Self, Failure> {
+        let read = Self::load_or_empty(file).and_then(Self::workable);
+        let config = read.map_err(|error| Failure::Input(error.to_string()))?;
+        let has_page = http.map_or(config.doors.http.is_some(), |http| http != Http::Off);
+        match config.lines.is_empty() && !(has_page && config.added.is_some()) {
+            true => {
+                let none = if has_page { "no folder in which they are kept" } else { "no page" };
+                let problem = format_args!("{NO_DRIVE}, and there is {none}, to add some there");
+                Err(Failure::Input(Source { file, text: "" }.error_of_file(problem).to_string()))
+            }
+            false => Ok(config),
+        }
     }
 
     /// The same, with other drives added at the page than those that stand there.
@@ -121,9 +132,7 @@ impl Config {
     fn read(file: &Path, text: &str) -> Result<Self, ConfigError> {
         let config = Self::parse(file, text, None)?;
         if config.lines.is_empty() {
-            return Err(
-                Source { file, text }.error_of_file("no drive: expected [[drives]] with line and drive")
-            );
+            return Err(Source { file, text }.error_of_file(NO_DRIVE));
         }
         Ok(config)
     }

@@ -347,11 +347,18 @@ fn a_daemon_begins_without_drives_and_with_nothing_else_that_is_wrong() {
     std::fs::create_dir_all(&folder).unwrap();
     let file = folder.join("drives.toml");
     // Whoever names a file that is not there has misspelt it.
-    assert!(Config::load_to_begin(&file).unwrap_err().to_string().contains("cannot be read"));
-    std::fs::write(&file, "# nothing yet\n").unwrap();
-    assert!(Config::load_to_begin(&file).unwrap().lines.is_empty());
+    let begin = |http| Config::load_to_begin(&file, http);
+    assert!(begin(None).unwrap_err().to_string().contains("cannot be read"));
     std::fs::write(&file, "state = \"/var/lib/drived\"\n").unwrap();
-    let config = Config::load_to_begin(&file).unwrap();
+    assert!(begin(None).unwrap().lines.is_empty());
+    // Nobody could ever add one.
+    let refused = begin(Some(Http::Off)).unwrap_err().to_string();
+    assert!(refused.contains("no drive: expected [[drives]]") && refused.contains("no page"), "{refused}");
+    std::fs::write(&file, "state = \"/var/lib/drived\"\n[http]\nlisten = \"off\"\n").unwrap();
+    assert!(begin(None).unwrap_err().to_string().contains("no page, to add some there"));
+    assert!(begin(Some(Http::default())).is_ok(), "it is said beside the file that there is one");
+    std::fs::write(&file, "state = \"/var/lib/drived\"\n").unwrap();
+    let config = begin(None).unwrap();
     assert_eq!(config.doors.state.folder.as_deref(), Some(Path::new("/var/lib/drived")));
     assert!(Config::load_workable(&file).unwrap_err().to_string().contains("no drive: expected [[drives]]"));
     for (wrong, told) in [
@@ -360,7 +367,7 @@ fn a_daemon_begins_without_drives_and_with_nothing_else_that_is_wrong() {
         ("[http\n", ""),
     ] {
         std::fs::write(&file, wrong).unwrap();
-        assert!(Config::load_to_begin(&file).unwrap_err().to_string().contains(told), "{wrong}");
+        assert!(begin(None).unwrap_err().to_string().contains(told), "{wrong}");
     }
     std::fs::remove_dir_all(&folder).unwrap();
 }

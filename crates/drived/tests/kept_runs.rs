@@ -384,6 +384,36 @@ fn what_a_run_leaves_in_its_state_folder_is_what_the_readme_lists() {
 }
 
 #[test]
+fn an_empty_configuration_behind_a_kill_is_an_alarm_of_the_motor_that_runs_and_without_a_page_nothing_begins()
+{
+    let plant = Plant::new("kept-emptied");
+    plant.run_and_kill();
+    // Nothing could bring it a drive.
+    let head = format!("state = \"{}\"\n[http]\nlisten = ", plant.state.display());
+    fs::write(plant.file.path(), format!("{head}\"off\"\n")).expect("it can be written");
+    for command in [&["run", "--socket", &plant.socket][..], &["check"]] {
+        let refused = run(&[command, &["--config", plant.file.path()]].concat());
+        refused.assert_refused(2, "no drive: expected [[drives]]");
+    }
+    fs::write(plant.file.path(), format!("{head}\"127.0.0.1:0\"\n")).expect("it can be written");
+    run(&["check", "--config", plant.file.path()]).assert_done();
+    let mut daemon = plant.daemon();
+    daemon.wait_for_log("no drive yet");
+    let alarm = loop {
+        let told = run(&["alarms", "list", "--json", "--socket", &plant.socket]);
+        let told: serde_json::Value = serde_json::from_str(&told.out).unwrap_or_default();
+        match told["alarms"].as_array().and_then(|all| all.first().cloned()) {
+            Some(alarm) => break alarm,
+            None => assert!(!daemon.has_ended()),
+        }
+    };
+    assert_eq!(alarm["kind"], "run_left", "{alarm}");
+    assert!(alarm["text"].as_str().is_some_and(|text| text.contains("pump (")), "{alarm}");
+    let (code, rest) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{rest}");
+}
+
+#[test]
 fn a_stop_whose_drive_is_not_in_the_configuration_any_more_is_an_alarm_until_it_is_there_again() {
     let plant = with_a_stop_pending("kept-left");
     let text = fs::read_to_string(plant.file.path()).expect("it is there");

@@ -8,6 +8,7 @@ use tokio::time::Instant;
 use super::table::AlarmKind;
 use crate::{
     place::Place,
+    settings::RunRecord,
     snapshot::{Link, Snapshot},
 };
 
@@ -148,13 +149,17 @@ impl Look {
         }
     }
 
-    /// At the program, with what is wrong with it, in words, and with the stops that are nobody's: of which drive, by its place. What is
-    /// not there is not so.
+    /// At the program, with what is wrong with it, in words, and with what an earlier run has left of drives that are not in the
+    /// configuration: which drive, and its record, by its place. What is not there is not so.
     #[must_use]
-    pub fn at_program(wrong: &BTreeMap<AlarmKind, String>, stops_left: &BTreeMap<Place, String>) -> Self {
+    pub fn at_program(
+        wrong: &BTreeMap<AlarmKind, String>,
+        left: &BTreeMap<Place, (String, RunRecord)>,
+    ) -> Self {
         let wrong = wrong.iter().map(|(kind, why)| condition(*kind, None, Some(why.clone())));
-        let left = stops_left.iter().map(|(place, drive)| {
-            condition(AlarmKind::StopLeft, Some(place.to_string()), Some(drive.clone()))
+        let left = left.iter().map(|(place, (drive, run))| {
+            let kind = if run.stop.is_some() { AlarmKind::StopLeft } else { AlarmKind::RunLeft };
+            condition(kind, Some(place.to_string()), Some(drive.clone()))
         });
         let there = wrong.chain(left).collect();
         Self { drive: None, line: None, there, seen: AlarmKind::all().collect() }

@@ -23,6 +23,8 @@ pub enum AlarmKind {
     LineFinding,
     /// A stop that was not confirmed is kept of a drive that is not in the configuration: nobody gives it.
     StopLeft,
+    /// A run command is kept of a drive that is not in the configuration: nobody watches what it turns.
+    RunLeft,
     /// The audit log cannot be written, so that only stops are carried out.
     AuditLog,
     /// The history cannot be written: what happens now is not known later.
@@ -34,11 +36,12 @@ pub enum AlarmKind {
 }
 
 /// Those that are of no drive's own.
-const OTHERS: [AlarmKind; 8] = [
+const OTHERS: [AlarmKind; 9] = [
     AlarmKind::LineAway,
     AlarmKind::LineSilent,
     AlarmKind::LineFinding,
     AlarmKind::StopLeft,
+    AlarmKind::RunLeft,
     AlarmKind::AuditLog,
     AlarmKind::History,
     AlarmKind::Maintenance,
@@ -91,6 +94,12 @@ impl AlarmKind {
                 "a stop was not confirmed, and nobody gives it, for its drive is not in the configuration: the motor may turn",
                 Severity::Alarm,
                 "see whether the motor turns; once its drive is in the configuration again, the stop is given anew",
+            ),
+            Self::RunLeft => row(
+                "run_left",
+                "a run command of this program may stand in a drive that is not in the configuration, and nobody watches it: the motor may turn",
+                Severity::Alarm,
+                "see whether the motor turns; once its drive is in the configuration again, it is watched and can be stopped from here",
             ),
             Self::AuditLog => row(
                 "audit_log",
@@ -164,7 +173,7 @@ impl AlarmKind {
     pub const fn is_of_motion(self) -> bool {
         match self {
             Self::Drive(kind) => kind.wakes(),
-            Self::StopLeft => true,
+            Self::StopLeft | Self::RunLeft => true,
             _ => false,
         }
     }

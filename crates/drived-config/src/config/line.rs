@@ -99,6 +99,9 @@ impl LineEntry {
     }
 }
 
+/// What is wrong with a file that has to have a drive, and has none.
+pub const NO_DRIVE: &str = "no drive: expected [[drives]] with line and drive";
+
 /// The drives of the file, by line.
 pub struct Members(BTreeMap<String, Vec<Member>>);
 
@@ -130,7 +133,7 @@ impl Members {
         }
         // A file without either is one of which nothing is known yet.
         if drives.is_empty() && !lines.is_empty() {
-            return Err(source.error_of_file("no drive: expected [[drives]] with line and drive"));
+            return Err(source.error_of_file(NO_DRIVE));
         }
         let mut groups: BTreeMap<String, Vec<Member>> = BTreeMap::new();
         let (mut names, mut slots) = (BTreeMap::new(), BTreeMap::new());

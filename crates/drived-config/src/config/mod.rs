@@ -21,7 +21,7 @@ use self::line::demand;
 pub use self::{
     drive::DriveEntry,
     groups::{Entries as GroupEntries, Group, groups},
-    line::{LineEntries, LineEntry, Members, line_part},
+    line::{LineEntries, LineEntry, Members, NO_DRIVE, line_part},
     place::{ConfigError, Source},
     state::{Environment, Said as SaidState, State},
     table::{Entry, Key, Said, Tells, settings, shown, within},

@@ -97,11 +97,12 @@ fn what_belongs_to_nobody_is_kept_until_the_place_is_there_again() {
     assert_eq!(after.all().len(), 1);
     after.set_all([]);
     assert!(after.write());
-    // Whose stop nobody gives is known, and nothing else that is nobody's.
-    assert_eq!(after.stops_left(), BTreeMap::from([(ONE.into(), format!("north ({ONE})"))]));
-    assert_eq!(before.stops_left(), BTreeMap::new());
+    // What is nobody's is known.
+    let left = (format!("north ({ONE})"), stop.clone());
+    assert_eq!(after.left(), BTreeMap::from([(ONE.into(), left)]));
+    assert_eq!(before.left(), BTreeMap::new());
     after.call(&ONE.into(), "east");
-    assert_eq!(after.stops_left(), BTreeMap::new());
+    assert_eq!(after.left(), BTreeMap::new());
     // Whoever comes to its place has it.
     assert_eq!(open(&[("east", ONE)]).of(&ONE.into()), Some(stop.clone()));
     // Its name is at a place that is new: a stop goes with it, and a run does not.

@@ -95,7 +95,7 @@ pub struct Args {
 }
 
 pub async fn run(args: Args) -> Result<(), Failure> {
-    let config = Config::load_to_begin(&args.config)?;
+    let config = Config::load_to_begin(&args.config, args.http)?;
     let aside = config.added.as_ref().and_then(|added| added.aside(&args.config));
     for doubt in config.doubts().into_iter().chain(aside) {
         tracing::warn!("{doubt}");
@@ -142,7 +142,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     // Before anything is kept by which a later start sees that there was this one.
     let names = Names::in_folder(config.doors.state.folder.as_deref());
     tell_names(&names, &config.lines, &config.groups);
-    let alarms = KeptAlarms::in_folder(folder, &places).with_stops_of(kept.runs.clone());
+    let alarms = KeptAlarms::in_folder(folder, &places).with_runs_of(kept.runs.clone());
     let plant = Plant::start_with(fleet.clone(), config.groups.clone(), false, &alarms, watched);
     plant.set_names(names.clone());
     let watched = plant.keep_watched();

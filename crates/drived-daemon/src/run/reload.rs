@@ -3,7 +3,7 @@
 mod changes;
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, PoisonError},
     time::Duration,
 };
@@ -25,7 +25,7 @@ use super::{
     profiles::Opened,
 };
 use drived_config::{
-    config::{DrivePart, add},
+    config::{DrivePart, NO_DRIVE, add},
     names::Names,
 };
 use drived_file::{Config, is_one_wire};
@@ -219,9 +219,10 @@ impl Reloader {
         let mut config = self.changing().await?;
         let file = self.0.file.clone();
         // A name of a server may have to be looked up.
-        let read = blocking(move || Config::load_workable(&file)).await;
-        let mut read =
-            read.and_then(|new| no_new_doubt(&config, &new).and(still_own(&config, &new)).map(|()| new));
+        let read = blocking(move || Config::load_to_begin(&file, None)).await;
+        let mut read = read.and_then(|new| {
+            no_new_doubt(&config, &new).and(still_own(&self.0.file, &config, &new)).map(|()| new)
+        });
         if let Ok(new) = &read
             && let Err(scanned) = self.leaves_the_scan(&config, new).await
         {
@@ -279,7 +280,7 @@ impl Reloader {
         let file = self.0.file.clone();
         let read = blocking(move || {
             // As it stands now: a person may have changed it.
-            let there = Config::load_to_begin(&file)?;
+            let there = Config::load_to_begin(&file, None)?;
             if let Some(closed) = here::closed(there.added.as_ref()) {
                 return Err(Failure::Input(here::why(closed, &file)));
             }
@@ -410,11 +411,14 @@ async fn blocking<T: Send + 'static>(
 }
 
 /// A configuration that has lost its drives is no wish for those that stand aside: an editor may have half written it.
-fn still_own(config: &Config, new: &Config) -> Result<(), Failure> {
+fn still_own(file: &Path, config: &Config, new: &Config) -> Result<(), Failure> {
+    if new.lines.is_empty() && !config.lines.is_empty() {
+        return Err(Failure::Input(format!("{}: {NO_DRIVE}", file.display())));
+    }
     let has_own = config.added.as_ref().is_some_and(|added| added.is_aside);
     match &new.added {
         Some(added) if has_own && !added.is_aside => Err(Failure::Input(format!(
-            "no drive: expected [[drives]] with line and drive; those of {} hold from the next start on",
+            "{NO_DRIVE}; those of {} hold from the next start on",
             added.file.display()
         ))),
         _ => Ok(()),

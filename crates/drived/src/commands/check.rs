@@ -36,9 +36,9 @@ const CLOSING: Duration = Duration::from_secs(10);
 const PACKAGED: Duration = Duration::from_secs(90);
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    // A file that is there may have no drive yet: they can be added at the page.
+    // A file that is there is what a daemon begins with: it may have no drive yet, where they can be added at the page.
     let config = match args.config.exists() {
-        true => Config::load_to_begin(&args.config)?,
+        true => Config::load_to_begin(&args.config, None)?,
         false => Config::load_workable(&args.config)?,
     };
     for (_, face) in &config.faces {

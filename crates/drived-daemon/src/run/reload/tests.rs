@@ -79,7 +79,7 @@ async fn answers_as_described(reloader: Reloader) {
 
 /// A daemon of this configuration that has no face.
 fn begun(file: &std::path::Path) -> (Fleet, Reloader) {
-    let config = Config::load_to_begin(file).unwrap();
+    let config = Config::load_to_begin(file, None).unwrap();
     let lines: Vec<Line> =
         config.lines.iter().map(|part| Line::start(part.config.clone()).unwrap()).collect();
     begun_with(file, config, &lines)
@@ -106,7 +106,7 @@ async fn a_reload_that_waits_for_a_silent_drive_says_in_time_for_which_and_goes_
     let controlled = |drives: &[(&str, u8, &str)]| format!("{}control = true\n", text(drives));
     fs::write(&file, controlled(&[("south", 1, "other"), ("north", 2, "beside"), ("north", 1, "pump")]))
         .unwrap();
-    let config = Config::load_to_begin(&file).unwrap();
+    let config = Config::load_to_begin(&file, None).unwrap();
     let sim = drive_sim::SimLine::default();
     let machine = sim.add(1, drive_sim::models::atv312::Atv312::under_bus_control()).unwrap();
     let settings = drive_core::SerialSettings::MODBUS_DEFAULT;

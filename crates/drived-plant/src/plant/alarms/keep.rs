@@ -77,9 +77,9 @@ impl KeptAlarms {
         Self { file: Some(file), alarms, places: places.collect(), runs: None }
     }
 
-    /// The same, where a stop that is kept of a drive which is not in the configuration is an alarm.
+    /// The same, where a stop or a run command that is kept of a drive which is not in the configuration is an alarm.
     #[must_use]
-    pub fn with_stops_of(self, runs: Records<RunRecord>) -> Self {
+    pub fn with_runs_of(self, runs: Records<RunRecord>) -> Self {
         Self { runs: Some(runs), ..self }
     }
 }

@@ -119,9 +119,9 @@ impl Desk {
         self.wrong.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The stops that are nobody's.
-    fn stops_left(&self) -> BTreeMap<Place, String> {
-        self.runs.as_ref().map(Records::stops_left).unwrap_or_default()
+    /// The stops and the run commands that are nobody's.
+    fn left(&self) -> BTreeMap<Place, (String, RunRecord)> {
+        self.runs.as_ref().map(Records::left).unwrap_or_default()
     }
 }
 

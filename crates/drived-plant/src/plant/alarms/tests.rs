@@ -175,6 +175,23 @@ async fn what_is_wrong_with_the_program_is_an_alarm_until_it_is_well_again() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_run_command_that_is_nobodys_is_an_alarm_of_a_motor_that_may_turn() {
+    let folder = Folder::new("alarms-run-left");
+    let file = folder.file("runs.json");
+    let lease = drive_core::Lease::new(drive_core::Direction::Forward, 15);
+    let record = serde_json::json!({ "identity": "ATV312HU22N4", "lease": lease });
+    let written = serde_json::json!({ "/dev/ttyUSB0 atv312@7": { "drive": "mixer", "record": record } });
+    fs::write(&file, written.to_string()).unwrap();
+    let runs = Records::<RunRecord>::open(Some(&file), &Places::default());
+    let test = TestPlant::keeping(1, &KeptAlarms::default().with_runs_of(runs)).await;
+    sleep(Duration::from_secs(3)).await;
+    let alarm = one(&test.plant);
+    assert_eq!((alarm.alarm.kind.word(), alarm.state), ("run_left", AlarmState::Unacknowledged));
+    assert!(alarm.alarm.kind.wakes(), "somebody is called for it");
+    assert!(alarm.text.contains("the motor may turn") && alarm.text.contains("mixer"), "{alarm:?}");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_stop_that_is_nobodys_is_an_alarm_through_restarts_until_its_drive_is_there_again() {
     const PLACE: &str = "/dev/ttyUSB0 atv312@7";
     let folder = Folder::new("alarms-stop-left");
@@ -184,7 +201,7 @@ async fn a_stop_that_is_nobodys_is_an_alarm_through_restarts_until_its_drive_is_
     let written = serde_json::json!({ PLACE: { "drive": "mixer", "record": record } });
     fs::write(&file, written.to_string()).unwrap();
     let runs = || Records::<RunRecord>::open(Some(&file), &Places::default());
-    let kept = || KeptAlarms::in_folder(Some(&folder.file("")), &Places::default()).with_stops_of(runs());
+    let kept = || KeptAlarms::in_folder(Some(&folder.file("")), &Places::default()).with_runs_of(runs());
     let test = TestPlant::keeping(1, &kept()).await;
     let keeping = test.plant.keep_alarms(kept());
     sleep(Duration::from_secs(3)).await;
