@@ -453,7 +453,7 @@ fn check_watchdog(
     watchdog: Option<WatchdogCapability>,
 ) -> Result<(), String> {
     let Some(watchdog) = watchdog else {
-        return Err(format!("the bus can neither read nor set a communication watchdog of {name}"));
+        return Err(format!("the bus cannot set a communication watchdog of {name}"));
     };
     let timeout = contract.timeout;
     let in_steps = timeout

@@ -187,6 +187,13 @@ pub enum EventKind {
         /// What it says.
         found: Arc<Identity>,
     },
+    /// **Alarm** while it is so: a setting on which its words rest is not as it has to be, or is so again.
+    SetUpOtherwise {
+        /// What, as a start is refused for it.
+        because: Refusal,
+        /// Whether it is so; `false`: not any more.
+        present: bool,
+    },
     /// Its communication watchdog is as the contract says; whether it had to be written for that.
     WatchdogVerified {
         /// As it is.
@@ -316,6 +323,7 @@ impl EventKind {
             Self::Identified(_) => "identified",
             Self::IdentityChanged { .. } => "identity changed",
             Self::OtherFamily { .. } => "other family",
+            Self::SetUpOtherwise { .. } => "set up otherwise",
             Self::WatchdogVerified { .. } => "watchdog verified",
             Self::WatchdogBroken(_) => "watchdog broken",
             Self::WatchdogNotInForce(_) => "watchdog not in force",
@@ -360,6 +368,7 @@ impl EventKind {
                 | Self::Tripped(_)
                 | Self::IdentityChanged { .. }
                 | Self::OtherFamily { .. }
+                | Self::SetUpOtherwise { present: true, .. }
                 | Self::WatchdogBroken(_)
                 | Self::WatchdogNotInForce(_)
                 | Self::StopUnconfirmed { .. }
@@ -400,6 +409,9 @@ impl fmt::Display for EventKind {
                 write!(f, ": {} instead of {}", found, remembered)
             }
             Self::OtherFamily { it_is, .. } => write!(f, ": {it_is}"),
+            Self::SetUpOtherwise { because, present } => {
+                write!(f, "{}: {because}", if *present { "" } else { ", not any more" })
+            }
             Self::RunAdopted(lease) => {
                 write!(
                     f,

@@ -362,6 +362,13 @@ pub enum Happened {
         it_is: String,
         found: Identity,
     },
+    /// A setting on which its words rest is not as it has to be, or is so again.
+    SetUpOtherwise {
+        /// What.
+        because: RefusalView,
+        /// Whether it is so.
+        present: bool,
+    },
     WatchdogVerified {
         watchdog: Watchdog,
         written: bool,
@@ -502,6 +509,9 @@ impl From<&EventKind> for Happened {
             },
             EventKind::OtherFamily { it_is, found } => {
                 Self::OtherFamily { it_is: it_is.to_string(), found: Identity::clone(found) }
+            }
+            EventKind::SetUpOtherwise { because, present } => {
+                Self::SetUpOtherwise { because: because.into(), present: *present }
             }
             EventKind::WatchdogVerified { watchdog, written, before } => Self::WatchdogVerified {
                 watchdog: *watchdog,

@@ -403,6 +403,41 @@ async fn a_watchdog_that_a_command_word_alone_feeds_is_not_fed_and_that_is_said(
     }
 }
 
+/// Its watchdog stands in a register: in tenths of a second, 0 is off.
+fn with_watchdog(table: &str) -> Profile {
+    let register = "[register.WDT]\nwhat = \"time of the watchdog\"\naddress = 0x0120\naccess = \"read_write\"\nstorage = \"ram\"\nunit = \"s\"\n\
+        scale = [1, 10]\nsource = \"made\"\n\n[state]";
+    let table = format!(
+        "[watchdog]\n{table}\naction = \"unknown\"\nactions = \"unknown\"\nsource = \"made\"\n\n[sources]"
+    );
+    let text = SIGNED.replacen("watchdog = \"none\"\n", "", 1);
+    profile(&text.replacen("[sources]", &table, 1).replacen("[state]", register, 1))
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_time_of_a_watchdog_is_read_where_its_profile_names_the_register_and_asking_feeds_it() {
+    const WDT: u16 = 0x0120;
+    let fed_by_any = "time = \"WDT\"\nzero_is = \"off\"\nfrom_factory = false\nfed_by = \"any_request\"";
+    let mut rig = rig(with_watchdog(fed_by_any));
+    assert_eq!(rig.drive.watchdog_capability(), None, "nobody sets it, and nobody has said its time");
+    for (word, time) in [(0, None), (20, Some(2_000)), (1, Some(100)), (6_000, Some(600_000))] {
+        assert!(rig.machine.poke(WDT, word));
+        let found = rig.drive.watchdog().await.expect("it is read");
+        assert_eq!(found.timeout, time.map(Duration::from_millis), "{word}");
+    }
+    for (other, why) in [
+        (fed_by_any.replace("any_request", "command_write"), "a command word alone feeds it"),
+        (fed_by_any.replace("\"WDT\"", "\"unknown\""), "in which register"),
+        (fed_by_any.replace("\"off\"", "\"unknown\""), "what a time of 0 means"),
+    ] {
+        let error = self::rig(with_watchdog(&other)).drive.watchdog().await.expect_err(why);
+        assert!(error.kind() == ErrorKind::Unsupported && error.to_string().contains(why), "{error}");
+    }
+    let said: Vec<String> = with_watchdog(fed_by_any).not_known().map(str::to_owned).collect();
+    let told = "off from the factory; whoever polls it reads how it is set, and feeds it";
+    assert!(said.iter().any(|what| what.contains(told)), "{said:?}");
+}
+
 /// Behind a setpoint below the output a stop does not show before the output is there: until then nothing tells that it has arrived.
 #[tokio::test(start_paused = true)]
 async fn no_run_word_follows_a_stop_that_is_not_seen_yet() {

@@ -274,7 +274,7 @@ fn what_is_wrong_is_told_with_file_line_field_and_what_was_expected() {
         (
             "control = false",
             "control = false\nwatchdog = { time = \"5s\", reaction = \"ramp\" }",
-            "drives.toml:29: watchdog: north 20: the bus can neither read nor set",
+            "drives.toml:29: watchdog: north 20: the bus cannot set a communication watchdog of Schneider Altivar 28",
         ),
         (
             "running = \"1s\"",

@@ -362,6 +362,21 @@ fn a_configuration_whose_folder_or_name_cannot_be_is_refused_with_the_line() {
         let file = File::new("refused-profiles", &text.replacen(place, by, 1));
         run(&["check", "--config", file.path()]).assert_refused(2, reason);
     }
+    // What the bus does not set is set at the drive, and its owner says to what.
+    let watched =
+        text.replacen("own-drive@3\"", "vfs15@3\"\nwatchdog = { time = \"2s\", reaction = \"trip\" }", 1);
+    let file = File::new("refused-watchdog", &watched);
+    let refused = run(&["check", "--config", file.path()]);
+    refused.assert_refused(2, "expected options = { watchdog-time = \"2s\" }");
+    let said = watched.replacen(
+        "watchdog = { time = \"2s\", reaction = \"trip\" }",
+        "options = { watchdog-time = \"2s\" }",
+        1,
+    );
+    let file = File::new("said-watchdog", &said);
+    run(&["check", "--config", file.path()]).assert_done();
+    let planned = run(&["plan", "--config", file.path()]);
+    assert!(planned.assert_done().contains("watchdog of 2s, fed within"), "{planned:?}");
     // A file that no drive needs is left out, and said. One that a drive needs keeps it from being driven, by the file's own error.
     fs::write(folder.0.join("v20.toml"), OWN.replace("key = \"goodrive\"", "key = \"v20\""))
         .expect("it can be written");

@@ -36,8 +36,6 @@ pub(crate) struct Checks {
     /// It was asked because it refuses to tell its status.
     refused: bool,
     contract: Option<WatchdogContract>,
-    /// Whether the bus can read it.
-    readable: bool,
     /// Whether the bus can set it.
     settable: bool,
     /// The time of a watchdog that the drive has whether anybody wants it or not.
@@ -83,7 +81,6 @@ impl Checks {
             identity_at: None,
             refused: false,
             contract: settings.watchdog,
-            readable: capability.is_some(),
             settable: capability.is_some_and(|watchdog| watchdog.settable),
             fixed: capability.and_then(|watchdog| watchdog.fixed()),
             watchdog,
@@ -207,8 +204,9 @@ impl Checks {
     fn wants_watchdog(&self) -> bool {
         match self.watchdog {
             WatchdogCheck::Unchecked | WatchdogCheck::Broken(_) => true,
-            WatchdogCheck::NoContract { found: None } => self.readable,
-            _ => false,
+            // Whoever has none says so without an exchange; of a drive by file its register tells.
+            WatchdogCheck::NoContract { found } => found.is_none(),
+            WatchdogCheck::WaitsForStandstill(_) | WatchdogCheck::Verified(_) => false,
         }
     }
 

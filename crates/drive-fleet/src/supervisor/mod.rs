@@ -175,6 +175,8 @@ pub(crate) struct Supervisor {
     exceeded: BTreeMap<&'static str, Limit>,
     /// What the family found to be set up otherwise.
     unmet: Option<Refusal>,
+    /// The same as it was told last.
+    unmet_told: Option<Refusal>,
     /// Since when the drive says that it is at its reference, and is not at its setpoint.
     off_since: Option<Instant>,
     /// The same, once it lasts.
@@ -249,6 +251,7 @@ impl Supervisor {
             reported: false,
             exceeded: BTreeMap::new(),
             unmet: None,
+            unmet_told: None,
             off_since: None,
             off_setpoint: None,
             control_taken: None,
@@ -570,6 +573,20 @@ impl Supervisor {
     pub(crate) fn handle_unmet(&mut self, unmet: Option<Refusal>) {
         self.changed |= self.unmet != unmet;
         self.unmet = unmet;
+        // Of another drive that is told, and no setting.
+        let is_known = !matches!(
+            self.checks.identity(),
+            crate::snapshot::IdentityCheck::Unchecked | crate::snapshot::IdentityCheck::OtherFamily { .. }
+        );
+        if is_known && self.unmet_told != unmet {
+            let before = std::mem::replace(&mut self.unmet_told, unmet);
+            if let Some(because) = unmet.or(before) {
+                self.emit_shown(
+                    EventKind::SetUpOtherwise { because, present: unmet.is_some() },
+                    Cause::Found,
+                );
+            }
+        }
     }
 
     /// What a contract with the drive rests on has changed without this side.

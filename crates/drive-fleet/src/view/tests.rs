@@ -339,6 +339,8 @@ fn every_kind() -> Vec<EventKind> {
         EventKind::Identified(identity("A")),
         EventKind::IdentityChanged { remembered: identity("A"), found: identity("B") },
         EventKind::WatchdogVerified { watchdog, written: true, before: Some(Arc::new(before)) },
+        EventKind::SetUpOtherwise { because: Refusal::Tripped, present: true },
+        EventKind::SetUpOtherwise { because: Refusal::MotorRunning, present: false },
         EventKind::WatchdogBroken("not kept".to_owned()),
         EventKind::WatchdogNotInForce("off".to_owned()),
         EventKind::WatchdogRestored(watchdog),

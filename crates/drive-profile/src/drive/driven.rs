@@ -2,8 +2,8 @@
 
 use drive_core::{
     Class, Command, Direction, Drive, Error, Faults, Identity, Lease, Measurements, Port, Recognised,
-    Refusal, Result, Row, Setpoint, Status, StopMode, Stopped, WatchdogCapability, Withdrawn, Written,
-    async_trait, registers::refuse_commands,
+    Refusal, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Withdrawn,
+    Written, async_trait, registers::refuse_commands,
 };
 
 use super::ProfileDrive;
@@ -105,7 +105,8 @@ impl<P: Port> Drive for ProfileDrive<P> {
         self.pulse_reset().await
     }
 
-    /// A watchdog that its owner has told of and that the bus cannot set: it has to be fed. One that a command word alone feeds is not:
+    /// A watchdog that its owner has told of and that the bus cannot set: it has to be fed, and the line is planned for that. What
+    /// [`watchdog`](Self::watchdog) reads in a register is fed besides. One that a command word alone feeds is not:
     /// no run command is repeated, because nothing that the drive shows tells its run word from another master's stop at once.
     fn watchdog_capability(&self) -> Option<WatchdogCapability> {
         let fixed = |time| WatchdogCapability {
@@ -117,6 +118,10 @@ impl<P: Port> Drive for ProfileDrive<P> {
             wears: false,
         };
         self.owner.watchdog.filter(|_| self.profile.is_fed_by_any_request()).map(fixed)
+    }
+
+    async fn watchdog(&mut self) -> Result<Watchdog> {
+        self.read_watchdog().await
     }
 
     /// A reading, and nothing else.

@@ -10,6 +10,7 @@ mod reading;
 mod setpoint;
 mod sight;
 mod tables;
+mod watchdog;
 
 use std::sync::Arc;
 

@@ -163,6 +163,9 @@ impl DriveEntry {
     }
 }
 
+/// The option by which the owner of a drive by file says how its communication watchdog is set.
+const WATCHDOG_TIME: &str = "watchdog-time";
+
 /// The settings of one drive: what its entry says, else the defaults, else what holds anyway.
 pub(super) fn settings(
     source: Source<'_>,
@@ -202,7 +205,14 @@ pub(super) fn settings(
             "periods" => &["max_age", "running", "rest", "slow"],
             _ => std::slice::from_ref(&problem.setting),
         };
-        return refuse(keys.iter().find_map(|key| place(key)), problem.to_string());
+        // Of a drive by file it is set at the drive, and its owner says to what.
+        let instead = (problem.setting == "watchdog" && drive.family.has_option(WATCHDOG_TIME)).then(|| {
+            format!(
+                ": set it at the drive, and say here to what, so that it is asked often enough: expected options = {{ {WATCHDOG_TIME} = \"2s\" }}"
+            )
+        });
+        let problem_told = format!("{problem}{}", instead.unwrap_or_default());
+        return refuse(keys.iter().find_map(|key| place(key)), problem_told);
     }
     if !settings.control {
         return match entry.said().into_iter().find(|said| said.acts) {

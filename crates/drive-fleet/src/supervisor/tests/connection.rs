@@ -199,6 +199,25 @@ fn a_watchdog_is_fed_by_a_frame_of_its_own_when_no_poll_does() {
     assert!(rig.drive.log.iter().filter(|job| **job == Job::KeepAlive).count() >= 8, "{:?}", rig.drive.log);
 }
 
+/// Of a family that lists none: whether a drive by file has one is a word of its register.
+#[test]
+fn a_watchdog_that_only_the_drive_tells_of_is_read_and_fed_as_it_is_found() {
+    let periods =
+        Periods { running: 4_000 * MS, rest: 4_000 * MS, slow: Duration::ZERO, max_age: 12_000 * MS };
+    let mut rig = Rig::controlled();
+    rig.machine =
+        Supervisor::new(rig.now, DriveSettings { periods, watchdog: None, ..settings() }, None, None);
+    rig.drive.watchdog = Watchdog { timeout: Some(2_000 * MS), reaction: None };
+    rig.pass(500 * MS);
+    let found = Some(rig.drive.watchdog);
+    assert_eq!(rig.snapshot().watchdog, WatchdogCheck::NoContract { found });
+    rig.drive.log.clear();
+    rig.pass(20_000 * MS);
+    let asked = rig.drive.log.len();
+    assert!(asked >= 18, "something within each half of its time: {:?}", rig.drive.log);
+    assert_eq!(rig.drive.writes(), []);
+}
+
 #[test]
 fn a_stream_of_orders_does_not_blind_the_fleet() {
     let mut rig = Rig::ready();
@@ -490,6 +509,37 @@ fn what_is_set_up_otherwise_in_a_drive_is_an_alarm_that_says_what_for_as_long_as
         assert!(concern.iter().all(|concern| concern.kind == ConcernKind::SetUpOtherwise), "{concern:?}");
         assert_eq!(concern.and_then(|concern| concern.detail), told);
     }
+}
+
+#[test]
+fn what_is_set_up_otherwise_is_an_event_once_when_it_begins_and_once_when_it_ends() {
+    const A001: Refusal = Refusal::Settings("A001 reads 1: set A001 to 3 at the drive");
+    const A002: Refusal = Refusal::Settings("A002 reads 1: set A002 to 3 at the drive");
+    let mut rig = Rig::ready();
+    for unmet in [None, Some(A001), Some(A001), Some(A002), None, None] {
+        rig.machine.handle_unmet(unmet);
+        rig.pass(100 * MS);
+    }
+    let told = rig.outputs.iter().filter_map(|output| match output {
+        Output::Event(happened) => Some(happened.kind.to_string()),
+        _ => None,
+    });
+    let told: Vec<String> = told.filter(|text| text.starts_with("set up otherwise")).collect();
+    let all = [
+        format!("set up otherwise: {A001}"),
+        format!("set up otherwise: {A002}"),
+        format!("set up otherwise, not any more: {A002}"),
+    ];
+    assert_eq!(told, all);
+    // Of another drive that is told, and no setting.
+    let mut another = Rig::ready();
+    another.drive.recognised = Recognised::NotMine { it_is: "another" };
+    another.drive.identity = Identity { model: Some("two".to_owned()), ..Identity::default() };
+    line_lost(&mut another);
+    another.machine.handle_unmet(Some(A001));
+    another.pass(5_000 * MS);
+    let events = another.events();
+    assert!(events.contains(&"other family") && !events.contains(&"set up otherwise"), "{events:?}");
 }
 
 /// The same rig with another drive at the end of its line, which was opened again.

@@ -263,6 +263,7 @@ export const SENTENCES_FR = {
   'whether the drive tells who commands it is not known': 'on ne sait pas si le variateur dit qui le commande',
   'whether the drive tells who gives its reference is not known': 'on ne sait pas si le variateur dit qui donne sa référence',
   'its communication watchdog is off from the factory': 'sa surveillance de communication est coupée en réglage usine',
+  'its communication watchdog is off from the factory; whoever polls it reads how it is set, and feeds it': 'sa surveillance de communication est coupée en réglage usine ; qui l’interroge lit son réglage et l’entretient',
   'a command word alone feeds its communication watchdog, and none is repeated: where it is set, it acts behind each': 'seul un mot de commande relance sa surveillance de communication, et aucun n’est répété : si elle est réglée, elle agit après chacun',
   'it has no communication watchdog: it runs on when the line is lost': 'il n’a pas de surveillance de communication : il continue de tourner si la ligne est perdue',
   'whether it stops by itself when the line is lost is not known': 'on ne sait pas s’il s’arrête de lui-même quand la ligne est perdue',

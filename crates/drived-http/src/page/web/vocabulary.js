@@ -138,6 +138,7 @@ const WORDS = {
   link_timeout: ['Late acknowledgements', 'Acquittements tardifs'],
   driver_panicked: ['Driver panicked', 'Pilote défaillant'],
   value_withdrawn: ['Value withdrawn', 'Valeur retirée'],
+  set_up_otherwise: ['Set up otherwise', 'Réglé autrement'],
   output_blocked: ['Output blocked', 'Sortie bloquée'],
   reference_taken: ['Reference taken', 'Consigne prise'],
   command_overridden: ['Command overridden', 'Commande supplantée'],
