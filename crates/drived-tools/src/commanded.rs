@@ -2,7 +2,7 @@
 
 use std::{fmt, time::Duration};
 
-use drive_bus::{Line, LineConfig};
+use drive_bus::{Endpoint, Line, LineConfig};
 use drive_core::{Error, ErrorKind, Frequency, Motion, PortError, Status, StopMode};
 use drive_families::Options;
 use drive_fleet::{
@@ -11,7 +11,7 @@ use drive_fleet::{
 };
 use tokio::time::{Instant, MissedTickBehavior, interval_at, timeout};
 
-use drived_client::own_line;
+use drived_client::{self as client, own_line};
 use drived_words::{drive_spec::DriveName, failure::Failure, output, signals::Ending};
 
 /// What whoever waits for a stop has to know.
@@ -33,8 +33,8 @@ const SECOND: Duration = Duration::from_secs(1);
 const PERIOD: Duration = Duration::from_millis(500);
 
 /// How long a motor is looked after that was started again behind its stop, once it stands: whoever starts it by a cycle does so again
-/// within it.
-const LOOKED_AFTER: Duration = Duration::from_secs(5);
+/// within it, unless the cycle is longer, which nobody can know.
+pub const LOOKED_AFTER: Duration = Duration::from_secs(5);
 
 /// How a motor was stopped.
 #[derive(Debug)]
@@ -256,6 +256,7 @@ impl Commanded {
         let mut seconds = interval_at(began + SECOND, SECOND);
         seconds.set_missed_tick_behavior(MissedTickBehavior::Skip);
         let mut course = Course::default();
+        let mut is_told_why = false;
         while self.has_started && timeout(Duration::ZERO, self.ending.asked()).await.is_ok() {}
         let outcome = loop {
             tokio::select! {
@@ -271,6 +272,11 @@ impl Commanded {
                 }
                 Ok(()) = watch.changed() => {
                     let Some(pending) = watch.look().stop else { continue };
+                    if let Some(why) = self.away().filter(|_| !is_told_why && pending.attempts == 0) {
+                        is_told_why = true;
+                        let whose = self.whose().await.map_or_else(String::new, |whose| format!("; {whose}"));
+                        self.say(format_args!("{name}: the stop cannot be sent yet: {why}{whose}"));
+                    }
                     let status = self.status();
                     for news in course.look(pending, status.motion) {
                         match news {
@@ -294,7 +300,8 @@ impl Commanded {
                         1 => "sent 1 time".to_owned(),
                         times => format!("sent {times} times"),
                     };
-                    self.say(format_args!("{name} has not confirmed the stop after {waited} s, {sent}: it goes on"));
+                    let why = self.away().map_or_else(String::new, |why| format!(" ({why})"));
+                    self.say(format_args!("{name} has not confirmed the stop after {waited} s, {sent}{why}: it goes on"));
                 }
             }
         };
@@ -314,6 +321,17 @@ impl Commanded {
         self.say(format_args!(
             "{name}: a run command{whose} came behind the stop: the drive shows {status}, and it is sent again"
         ));
+    }
+
+    /// Why nothing can be sent, while the port of the line is away.
+    fn away(&self) -> Option<String> {
+        self.line.stats().port_away().map(str::to_owned)
+    }
+
+    /// Whose the port is, where somebody else has it. Whoever waits for a stop is told in time, or not.
+    async fn whose(&self) -> Option<String> {
+        let Endpoint::Serial(path) = &self.config.endpoint else { return None };
+        timeout(SECOND, client::explain(path, Some(self.name))).await.ok().flatten()
     }
 
     /// Whether nothing can be sent.
@@ -592,6 +610,28 @@ mod tests {
         let [at] = times(&one, UNCONFIRMED)[..] else { panic!("{:?}", one.said) };
         let after = at - began;
         assert!((10 * SECOND..11 * SECOND).contains(&after), "{after:?}");
+    }
+
+    /// A serial port that is not there: at once, and with each second.
+    #[tokio::test(start_paused = true)]
+    async fn a_stop_that_cannot_be_sent_says_why_while_it_goes_on() {
+        let family = Family::ATV312;
+        let config = LineConfig::serial("/dev/no-such-port", family.capabilities().factory);
+        let line = Line::start(config.clone()).unwrap();
+        let name = DriveName { family, slave: SlaveAddress::try_from(1).unwrap() };
+        let mut one = Commanded::over(name, line, config, &simulated::options(), Vec::new()).unwrap();
+        let failure = one.stop(StopMode::Ramp).await.unwrap_err().to_string();
+        assert!(failure.starts_with(UNCONFIRMED), "{failure}");
+        const WHY: &str = "there is no serial port /dev/no-such-port";
+        assert_eq!(times(&one, &format!("the stop cannot be sent yet: {WHY}")).len(), 1, "{:?}", one.said);
+        let seconds = times(&one, "has not confirmed the stop").len();
+        assert!(seconds > 0, "{:?}", one.said);
+        assert_eq!(
+            times(&one, &format!("not sent yet ({WHY}): it goes on")).len(),
+            seconds,
+            "{:?}",
+            one.said
+        );
     }
 
     #[tokio::test(start_paused = true)]

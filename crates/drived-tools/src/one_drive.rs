@@ -11,7 +11,7 @@ use drive_families::Options;
 use drive_fleet::{Order, Refused, Started, view::StopModesView};
 use serde_json::json;
 
-use crate::commanded::{Commanded, Stop};
+use crate::commanded::{Commanded, LOOKED_AFTER, Stop};
 use drived_client::{
     self as client, self, Daemon, DaemonArgs, Target, Told,
     own_line::{close, may_have_written, open_drive, open_line_of, wait_at_most, words},
@@ -157,10 +157,14 @@ impl OneDriveArgs {
         if modes.is_told() {
             body["text"] = json!(modes.to_string());
         }
-        let mut behind = "";
+        let mut behind = String::new();
         if *restarts > 0 {
             body["restarts"] = json!(restarts);
-            behind = ", and was started again by somebody else while it stopped";
+            behind = format!(
+                ", and was started again by somebody else while it stopped: it was looked after for {} s more, and whoever starts it by a \
+                 longer cycle does so again",
+                LOOKED_AFTER.as_secs()
+            );
         }
         let stopped = values::stopped(Some(status));
         self.daemon.say(&body, || {

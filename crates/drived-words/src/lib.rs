@@ -3,7 +3,7 @@
 //! - What is given: a drive ([`drive_spec`]), its options ([`drive_options`]), a line ([`line_spec`]), a time ([`duration`]), a moment ([`moment`]),
 //!   and an object that a program sends ([`strict`], [`object`]).
 //! - What is told: results and tables ([`output`]), objects ([`json`]), measurements ([`values`]), parameters
-//!   ([`registers`]), frames of a line in words ([`explain`]), and the [log](`logging`).
+//!   ([`registers`], and what has to hold among them, [`way`]), frames of a line in words ([`explain`]), and the [log](`logging`).
 //! - How it ends: what went wrong ([`failure`]) being asked to end ([`signals`]) and letting a port go
 //!   ([`closing`]).
 
@@ -33,3 +33,4 @@ pub mod registers;
 pub mod signals;
 pub mod strict;
 pub mod values;
+pub mod way;

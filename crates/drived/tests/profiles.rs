@@ -368,9 +368,9 @@ fn a_configuration_whose_folder_or_name_cannot_be_is_refused_with_the_line() {
     let file = File::new("refused-watchdog", &watched);
     let refused = run(&["check", "--config", file.path()]);
     refused.assert_refused(2, "expected options = { watchdog-time = \"2s\" }");
-    let said = watched.replacen(
-        "watchdog = { time = \"2s\", reaction = \"trip\" }",
-        "options = { watchdog-time = \"2s\" }",
+    let said = text.replacen("own-drive@3", "vfs15@3", 1).replacen(
+        "options = { highest",
+        "options = { watchdog-time = \"2s\", highest",
         1,
     );
     let file = File::new("said-watchdog", &said);

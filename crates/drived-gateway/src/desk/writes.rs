@@ -393,6 +393,10 @@ impl Desk {
             writes.push((row, word));
         }
         let drive = drive.commanded_by(&*self.config.name);
+        let judged = timeout_at(deadline, self.plant.forbids(&drive, &writes)).await;
+        if let Some(why) = judged.map_err(|_| pending(&drive))? {
+            return Err(Refusal::rule(why));
+        }
         for (row, word) in writes {
             let what = format!("{}: {} = {word}", drive.name(), row.code);
             let record = self.audit.record(Record::new(Kind::Command, caller, what));

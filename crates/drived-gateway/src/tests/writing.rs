@@ -187,6 +187,19 @@ async fn parameters_are_written_where_allowed_and_never_by_an_address_that_is_no
     assert_eq!(peer.ask(1, &write(CMI, 0x0002)).await, [0x86, 0x04]);
 }
 
+/// LSP ≤ HSP ≤ tFr (BBV51701 p. 27, 47): from the factory HSP is 50 Hz and tFr 60 Hz. What is refused is refused as a whole.
+#[tokio::test(start_paused = true)]
+async fn what_the_manual_wants_among_parameters_holds_for_a_client_as_well() {
+    const HSP: u16 = 3_104;
+    let (plant, desk) = operated(1, |config| (config.raw_writes, config.eeprom_writes) = (true, true)).await;
+    let mut peer = Peer::of(&desk);
+    assert_eq!(peer.ask(1, &write(HSP, 700)).await, [0x86, 0x04], "above tFr");
+    assert_eq!(peer.ask(1, &write_two(HSP, [450, 460])).await, [0x90, 0x04], "LSP, behind it, above HSP");
+    assert_eq!(plant.machines[0].peek(HSP), Some(500));
+    assert_eq!(peer.ask(1, &write(HSP, 600)).await, write(HSP, 600));
+    assert_eq!(plant.machines[0].peek(HSP), Some(600));
+}
+
 /// A parameter that may stand in the drive's EEPROM, whatever a client that writes it every second does to that.
 #[tokio::test(start_paused = true)]
 async fn what_wears_the_eeprom_is_written_only_where_that_is_allowed_by_itself() {

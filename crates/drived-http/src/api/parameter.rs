@@ -107,6 +107,9 @@ pub(super) async fn write(
     };
     let shown = answered(plant.in_units(&drive, row)).await?;
     let word = wanted(&shown, &text).map_err(|failure| Problem::unprocessable(failure.to_string()))?;
+    if let Some(why) = answered(async { Ok(plant.forbids(&drive, &[(row, word)]).await) }).await? {
+        return Err(Problem::unprocessable(why));
+    }
     if only_at_standstill {
         standing(&drive).await?;
     }

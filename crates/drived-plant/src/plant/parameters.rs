@@ -21,6 +21,7 @@ use drived_config::rights::Caller;
 use drived_words::{
     json::{milliseconds, unix},
     registers::{factory, range},
+    way::Way,
 };
 
 /// A word that was read this lately is not read again for a list.
@@ -241,6 +242,19 @@ impl Plant {
             self.0.words.keep(drive, by, Some(word));
         }
         Ok(self.0.words.in_units(drive, row))
+    }
+
+    /// Why these words are not written to a drive one after the other, whoever asks: one would leave it with what its manual forbids among
+    /// its registers. Those are read anew; what cannot be read forbids nothing.
+    pub async fn forbids(&self, drive: &DriveHandle, writes: &[(&'static Row, u16)]) -> Option<String> {
+        let mut way = Way::of(drive.capabilities(), std::iter::empty());
+        for row in way.judged_by(writes) {
+            if let Ok(word) = drive.read_parameter(row).await {
+                self.0.words.keep(drive, row, Some(word));
+                way.hold(row.place(), word);
+            }
+        }
+        way.refuses(writes)
     }
 
     /// Writes one register of a drive, unless it holds the word already, and reads it back. It goes on when nobody waits.

@@ -264,6 +264,8 @@ async fn a_parameter_is_read_and_written_by_an_engineer_and_kept_from_everybody_
     for (path, body, status) in [
         (path, json!({"value": "fast"}), StatusCode::UNPROCESSABLE_ENTITY),
         (path, json!({"value": "40000"}), StatusCode::UNPROCESSABLE_ENTITY),
+        // LSP ≤ HSP ≤ tFr (BBV51701 p. 27, 47): tFr is 60 Hz from the factory.
+        ("/api/v1/drives/pump%201/parameters/HSP", json!({"value": "70"}), StatusCode::UNPROCESSABLE_ENTITY),
         ("/api/v1/drives/pump%201/parameters/ETA", json!({"value": "1"}), StatusCode::UNPROCESSABLE_ENTITY),
         ("/api/v1/drives/pump%201/parameters/NIX", json!({"value": "1"}), StatusCode::NOT_FOUND),
         ("/api/v1/drives/pump%201/parameters/CMD", json!({"value": "000Fh"}), StatusCode::CONFLICT),

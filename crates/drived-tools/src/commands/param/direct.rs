@@ -3,15 +3,14 @@
 use drive_core::{Capabilities, Drive, ErrorKind, Row, Status, Written, registers::Storage};
 use serde_json::json;
 
-use super::{
-    rule,
-    shown::{find, value_cells, value_table},
-};
+use super::shown::{find, value_cells, value_table};
 use crate::one_drive::{OneDrive, OneDriveArgs};
 use drived_client::own_line::told;
 use drived_file::ledger::LedgerArgs;
 use drived_plant::plant::parameters::{ParameterView, WrittenView};
-use drived_words::{drive_spec::DriveName, failure::Failure, output, registers::wanted, signals::Ending};
+use drived_words::{
+    drive_spec::DriveName, failure::Failure, output, registers::wanted, signals::Ending, way::Way,
+};
 
 /// Reads registers.
 pub(super) async fn get(args: &OneDriveArgs, registers: &[String]) -> Result<(), Failure> {
@@ -107,7 +106,15 @@ async fn write(
     word: u16,
 ) -> Result<(Written, Option<Status>), Failure> {
     let capabilities = one.drive.capabilities();
-    rule::held(capabilities, row, word, async |row| one.drive.read_parameter(row).await.ok()).await?;
+    let mut way = Way::of(capabilities, std::iter::empty());
+    for row in way.judged_by(&[(row, word)]) {
+        if let Ok(word) = one.drive.read_parameter(row).await {
+            way.hold(row.place(), word);
+        }
+    }
+    if let Some(why) = way.refuses(&[(row, word)]) {
+        return Err(Failure::Input(why));
+    }
     let running = one.drive.status().await.ok().filter(|status| !status.is_undriven());
     let written = told(one.name, &mut Ending::listen()?, one.drive.write_parameter(row, word)).await?;
     one.count_of(row, &written);
@@ -237,5 +244,28 @@ mod tests {
         assert!(written.changed);
         assert_eq!(running.map(|status| status.motion), Some(Motion::Driven));
         machine.wait_until(|seen| seen.output_frequency == 4_500).await;
+    }
+
+    /// bEn ≤ LSP ≤ HSP ≤ tFr (BBV51701 p. 27, 47): HSP of 50 Hz and tFr of 60 Hz as the drive leaves the factory.
+    #[tokio::test(start_paused = true)]
+    async fn a_limit_that_passes_another_is_refused_as_a_restore_refuses_it() {
+        let mut bench = Bench::of(Family::ATV312, SetUp::ForTheBus);
+        let Source::OnLine(one) = &mut bench.source else { panic!("it is on a line") };
+        let capabilities = one.drive.capabilities();
+        for (code, word, allowed) in [
+            ("HSP", 700, false),
+            ("LSP", 510, false),
+            ("HSP", 600, true),
+            ("LSP", 450, true),
+            ("ACC", 700, true),
+        ] {
+            let row = Row::find(capabilities.rows, code).unwrap();
+            let written = write(one, row, word).await;
+            assert_eq!(written.is_ok(), allowed, "{code} {word}: {written:?}");
+            if let Err(failure) = written {
+                let told = failure.to_string();
+                assert!(told.contains("LSP ≤ HSP ≤ tFr") && told.contains("nothing was written"), "{told}");
+            }
+        }
     }
 }

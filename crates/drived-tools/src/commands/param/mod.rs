@@ -6,7 +6,6 @@ mod direct;
 pub mod file;
 mod remote;
 mod restore;
-mod rule;
 mod shown;
 pub mod source;
 #[cfg(test)]

@@ -1,18 +1,15 @@
 //! The same through the running daemon.
 
-use drive_core::Row;
-use drive_families::Family;
 use serde_json::json;
 
-use super::{direct::moved, rule};
+use super::direct::moved;
 use crate::one_drive::OneDriveArgs;
-use drived_client::{self as client, Daemon, Told, path_of};
+use drived_client::{self as client, Told};
 use drived_plant::plant::{
     commands::ActionWord,
     parameters::{AccessWord, ParameterView, WrittenView},
-    views::DriveView,
 };
-use drived_words::{failure::Failure, output, registers::wanted};
+use drived_words::{failure::Failure, output};
 
 /// Reads registers.
 pub(super) async fn get(one: &OneDriveArgs, words: &[String]) -> Result<(), Failure> {
@@ -40,9 +37,6 @@ pub(super) async fn set(
     let path = one.path(&mut daemon, Some(name), &["parameters", register]).await?;
     let drives = daemon.state().await?.drives;
     let drive = drives.iter().find(|drive| drive.name() == name);
-    if let Some(drive) = drive {
-        keep_rule(&mut daemon, drive, register, value).await?;
-    }
     let running =
         drive.and_then(|drive| drive.snapshot.status.value.as_ref()).filter(|status| !status.is_undriven());
     let written = daemon.put(&path, &json!({ "value": value, "save": save })).await?;
@@ -53,25 +47,6 @@ pub(super) async fn set(
         output::say(format_args!("{name} {text}"))?;
         running.map_or(Ok(()), |status| output::say(moved(status)))
     })
-}
-
-/// Refuses what a restore refuses. What is no value, or no register, the daemon says better.
-async fn keep_rule(
-    daemon: &mut Daemon,
-    drive: &DriveView,
-    register: &str,
-    value: &str,
-) -> Result<(), Failure> {
-    let Ok(family) = drive.family.parse::<Family>() else { return Ok(()) };
-    let capabilities = family.capabilities();
-    let Some(row) = Row::find(capabilities.rows, register) else { return Ok(()) };
-    // Of those whose unit another register chooses none has such a rule.
-    let Ok(word) = wanted(row, value) else { return Ok(()) };
-    let read = async |row: &'static Row| {
-        let path = path_of(&["drives", drive.name(), "parameters", &row.address.to_string()]);
-        daemon.get(&path).await.ok()?.done::<ParameterView>().ok()?.raw
-    };
-    rule::held(capabilities, row, word, read).await
 }
 
 /// Saves the parameters of a drive to its EEPROM.

@@ -6,12 +6,9 @@ use drive_core::{
     registers::{Change, Part},
 };
 
-use super::{
-    plan::{Plan, Wanted, ordered},
-    way::Way,
-};
+use super::plan::{Plan, Wanted, ordered};
 use crate::commands::param::source::{Source, Unread, Unwritten};
-use drived_words::{output::Progress, signals::Ending};
+use drived_words::{output::Progress, signals::Ending, way::Way};
 
 /// What has been done.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

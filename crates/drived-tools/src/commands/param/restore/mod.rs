@@ -2,9 +2,6 @@
 
 mod carry;
 mod plan;
-mod way;
-
-pub(super) use self::way::Way;
 
 use std::path::{Path, PathBuf};
 

@@ -6,9 +6,8 @@ use drive_core::{
 };
 use serde_json::{Value, json};
 
-use super::way::Way;
 use crate::commands::param::file::{Backup, Entry};
-use drived_words::{failure::Failure, output::Table, registers::range};
+use drived_words::{failure::Failure, output::Table, registers::range, way::Way};
 
 /// What is to be done to one drive.
 #[derive(Debug, Clone)]

@@ -4,49 +4,46 @@ use std::collections::BTreeMap;
 
 use drive_core::{
     Capabilities, Row,
-    registers::{Change, Place, Relation, Restoring},
+    registers::{Change, Place, Relation, Restoring, Space},
 };
 
-use drived_words::registers::brief;
+use crate::registers::brief;
 
 /// The words of a drive between two writes.
 #[derive(Debug, Clone)]
-pub(in crate::commands::param) struct Way {
+pub struct Way {
     capabilities: &'static Capabilities,
     held: BTreeMap<Place, u16>,
 }
 
 impl Way {
-    pub(in crate::commands::param) fn of(
-        capabilities: &'static Capabilities,
-        held: impl Iterator<Item = (Place, u16)>,
-    ) -> Self {
+    pub fn of(capabilities: &'static Capabilities, held: impl Iterator<Item = (Place, u16)>) -> Self {
         Self { capabilities, held: held.collect() }
     }
 
-    pub(in crate::commands::param) fn word(&self, place: impl Into<Place>) -> Option<u16> {
+    pub fn word(&self, place: impl Into<Place>) -> Option<u16> {
         self.held.get(&place.into()).copied()
     }
 
-    pub(in crate::commands::param) fn hold(&mut self, place: Place, word: u16) {
+    pub fn hold(&mut self, place: Place, word: u16) {
         self.held.insert(place, word);
     }
 
-    pub(super) fn forget(&mut self, place: Place) {
+    pub fn forget(&mut self, place: Place) {
         self.held.remove(&place);
     }
 
-    pub(super) const fn restoring(&self) -> &'static Restoring {
+    pub const fn restoring(&self) -> &'static Restoring {
         &self.capabilities.restoring
     }
 
     /// A word as a person reads it, in the unit that it has now.
-    pub(in crate::commands::param) fn text(&self, row: &Row, word: u16) -> String {
+    pub fn text(&self, row: &Row, word: u16) -> String {
         brief(&self.capabilities.in_units(row, |address| self.word(address)), word)
     }
 
     /// The registers that have a relation to one of these, themselves left out.
-    pub(in crate::commands::param) fn related(&self, addresses: &[u16]) -> Vec<&'static Row> {
+    pub fn related(&self, addresses: &[u16]) -> Vec<&'static Row> {
         let relations = self.capabilities.restoring.relations.iter();
         let relations = relations
             .filter(|relation| relation.registers.iter().any(|register| addresses.contains(register)));
@@ -56,10 +53,7 @@ impl Way {
     }
 
     /// What does not hold any more, in words, when a word is written, and did before; `None` where nothing is broken by it.
-    pub(in crate::commands::param) fn would_break(
-        &self,
-        Change { row, wanted, .. }: &Change,
-    ) -> Option<String> {
+    pub fn would_break(&self, Change { row, wanted, .. }: &Change) -> Option<String> {
         let mut then = self.clone();
         then.hold(row.place(), *wanted);
         let relations = self.capabilities.restoring.relations.iter();
@@ -70,8 +64,39 @@ impl Way {
         })
     }
 
+    /// The registers by which is judged whether these words may be written: none where the manual wants nothing to hold of them.
+    pub fn judged_by(&self, writes: &[(&'static Row, u16)]) -> Vec<&'static Row> {
+        let rows = || writes.iter().map(|(row, _)| *row).filter(|row| row.space == Space::HoldingRegister);
+        let addresses: Vec<u16> = rows().map(|row| row.address).collect();
+        let relations = self.capabilities.restoring.relations.iter();
+        let concerned = relations
+            .filter(|relation| relation.registers.iter().any(|register| addresses.contains(register)));
+        let registers: Vec<u16> = concerned.flat_map(|relation| relation.registers).copied().collect();
+        let is_one = |row: &&Row| {
+            row.space == Space::HoldingRegister
+                && registers.contains(&row.address)
+                && row.access.is_readable()
+        };
+        self.capabilities.rows.iter().filter(is_one).collect()
+    }
+
+    /// Why these words are not written, one after the other, to a drive that holds this: one of them would leave it with what its
+    /// manual forbids. What is not known forbids nothing.
+    pub fn refuses(&self, writes: &[(&'static Row, u16)]) -> Option<String> {
+        let mut way = self.clone();
+        writes.iter().find_map(|&(row, wanted)| {
+            let held = way.word(row.place()).unwrap_or(wanted);
+            let why = way.would_break(&Change { row, held, wanted }).map(|why| {
+                let text = way.text(row, wanted);
+                format!("{} {text}: the drive would be left with {why}; nothing was written", row.code)
+            });
+            way.hold(row.place(), wanted);
+            why
+        })
+    }
+
     /// What does not hold, and these registers have to do with it.
-    pub(super) fn breaks(&self, changed: &[u16]) -> Option<String> {
+    pub fn breaks(&self, changed: &[u16]) -> Option<String> {
         self.capabilities.restoring.relations.iter().find_map(|relation| {
             let broken = self.broken(relation)?;
             let is_ours = broken.iter().any(|row| changed.contains(&row.address));
@@ -80,7 +105,7 @@ impl Way {
     }
 
     /// Takes the first of these changes that breaks nothing when it is written now. `None`: there is none.
-    pub(super) fn take(&self, pending: &mut Vec<Change>) -> Option<Change> {
+    pub fn take(&self, pending: &mut Vec<Change>) -> Option<Change> {
         let index = pending.iter().position(|change| self.would_break(change).is_none())?;
         Some(pending.remove(index))
     }
