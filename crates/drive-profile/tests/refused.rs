@@ -350,6 +350,34 @@ fn two_registers_of_one_address_and_addresses_that_are_none() {
 }
 
 #[test]
+fn a_register_of_two_words_whose_second_is_another() {
+    let text = include_str!("data/signed.toml").replace("address = 0x0100", "address = 0x0111");
+    let refusals = read(&text).expect_err("STATUS stands in OUTPUT").0;
+    assert!(
+        refusals.iter().any(|of| of.reason == "OUTPUT has two words, and STATUS is one of them"),
+        "{refusals:#?}"
+    );
+    let both = text.replacen("words = 2\norder = \"high_first\"\naccess", "access", 1);
+    read(&both).expect("one word each");
+}
+
+#[test]
+fn what_is_seen_in_another_quantitys_unit() {
+    let signed = include_str!("data/signed.toml");
+    for (seen, of) in
+        [("output", "OUTPUT"), ("current", "SPEED"), ("speed", "STATUS"), ("dc_bus_voltage", "OUTPUT")]
+    {
+        let text = match seen {
+            "output" => signed.replace("unit = \"Hz\"\nscale = [1, 100]", "unit = \"A\"\nscale = [1, 100]"),
+            _ => signed.replace(&format!("{seen} = \"none\""), &format!("{seen} = \"{of}\"")),
+        };
+        let refusals = read(&text).expect_err(seen).0;
+        let reason = format!("{of} does not tell the {} that is seen in it", seen.replace('_', " "));
+        assert!(refusals.iter().any(|refusal| refusal.reason.starts_with(&reason)), "{refusals:#?}");
+    }
+}
+
+#[test]
 fn a_register_of_which_nobody_says_where_it_is_kept() {
     let text = good(V20).replace(
         "address = 40100\naccess = \"read_write\"\nstorage = \"ram\"\n",

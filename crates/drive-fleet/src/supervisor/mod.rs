@@ -177,6 +177,8 @@ pub(crate) struct Supervisor {
     unmet: Option<Refusal>,
     /// The same as it was told last.
     unmet_told: Option<Refusal>,
+    /// A stop of this side has taken the command from somebody else, which is told, and no status has shown it yet.
+    stop_took_command: bool,
     /// Since when the drive says that it is at its reference, and is not at its setpoint.
     off_since: Option<Instant>,
     /// The same, once it lasts.
@@ -252,6 +254,7 @@ impl Supervisor {
             exceeded: BTreeMap::new(),
             unmet: None,
             unmet_told: None,
+            stop_took_command: false,
             off_since: None,
             off_setpoint: None,
             control_taken: None,

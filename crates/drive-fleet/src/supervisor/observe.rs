@@ -171,10 +171,13 @@ impl Supervisor {
         match (somebody_else(before), somebody_else(status)) {
             (was, is) if was == is => {}
             (Some(was), None) => {
+                let by_stop = std::mem::take(&mut self.stop_took_command);
                 let start = self.acted.as_ref().filter(|acted| matches!(acted.job, Job::Start(_)));
                 match start.map(|acted| acted.cause.clone()).filter(|_| self.control_taken.is_none()) {
                     // It was not taken from this bus: so some drives stand until they are started.
                     Some(start) => self.emit_shown(EventKind::StartTookCommand(was), start),
+                    // A stop took it: that is told, and nobody has given it back.
+                    None if by_stop => {}
                     None => self.emit_shown(EventKind::ControlReturned, cause),
                 }
                 self.control_taken = None;
@@ -182,7 +185,7 @@ impl Supervisor {
             (None, None) => {}
             (_, Some(is)) => {
                 // Whoever has control now may give another reference.
-                self.given = None;
+                (self.given, self.stop_took_command) = (None, false);
                 // The reset of an Altivar 21 zeroes its command word (Modbus §6.4): so it gives command back, too.
                 let given =
                     self.acted.as_ref().filter(|acted| matches!(acted.job, Job::Release | Job::ResetFaults));

@@ -330,6 +330,7 @@ impl Supervisor {
                     stopping.takes(now, standstill);
                 }
                 if let Some(other) = taken_from {
+                    self.stop_took_command = true;
                     self.emit_by(EventKind::StopTookCommand(other), cause.clone());
                 }
                 if used != asked && used != told {

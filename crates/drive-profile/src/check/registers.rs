@@ -3,6 +3,7 @@
 use crate::format::Spanned;
 
 use super::Check;
+use crate::drive::is_double;
 use crate::format::{Access, Register, Storage, UnitName};
 
 impl Check<'_> {
@@ -150,6 +151,21 @@ impl Check<'_> {
                     &spanned.span(),
                     format!("{name} and {other} have one address"),
                     "one of them alone, and its name wherever the other stood; or the address that the manual prints for it",
+                );
+            }
+        }
+        for (name, spanned) in &file.register {
+            let Some((space, first)) = file.place(spanned.get_ref()).filter(|_| is_double(spanned.get_ref()))
+            else {
+                continue;
+            };
+            let second = first.checked_add(1).map(|second| (space, second));
+            let other = file.register.iter().find(|(_, other)| file.place(other.get_ref()) == second);
+            if let Some((other, _)) = other {
+                self.refuse(
+                    &spanned.span(),
+                    format!("{name} has two words, and {other} is one of them"),
+                    "words = 1, or the address that the manual prints for each",
                 );
             }
         }

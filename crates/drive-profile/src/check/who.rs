@@ -3,7 +3,7 @@
 use crate::format::Spanned;
 
 use super::Check;
-use crate::format::{Access, Answer, Bits, Guard};
+use crate::format::{Access, Answer, Bits, Guard, UnitName};
 
 impl Check<'_> {
     pub(super) fn who(&mut self) {
@@ -32,6 +32,15 @@ impl Check<'_> {
         }
         for seen in [&see.output, &see.speed] {
             self.is_no_echo(seen);
+        }
+        for (what, seen, units) in [
+            ("output", &see.output, &[UnitName::Hertz, UnitName::Percent][..]),
+            ("current", &see.current, &[UnitName::Ampere]),
+            ("speed", &see.speed, &[UnitName::Rpm]),
+            ("output voltage", &see.output_voltage, &[UnitName::Volt]),
+            ("dc bus voltage", &see.dc_bus_voltage, &[UnitName::Volt]),
+        ] {
+            self.is_in_its_unit(what, seen, units);
         }
         for bits in [&see.at_setpoint, &see.warning, &file.state.standstill] {
             if let Answer::Given(bits) = bits {

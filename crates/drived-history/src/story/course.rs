@@ -21,6 +21,9 @@ const MOMENT_MS: i64 = 100;
 /// So many sentences at the most.
 const COURSE: usize = 60;
 
+/// So many settings that were seen for the first time are told one by one.
+const FIRST_SEEN: usize = 4;
+
 /// What happened around a moment, in the daemon's order.
 pub(super) fn course(facts: &Facts, moment: i64) -> Vec<Sentence> {
     let is_told = |found: &&RecordView| {
@@ -93,21 +96,31 @@ pub(super) fn settings(
     to: i64,
 ) -> Result<Vec<Sentence>, StoreError> {
     let settings = parameters(connection, drive)?;
-    let mut said = Vec::new();
+    let (mut said, mut first) = (Vec::new(), Vec::new());
     for (place, setting) in settings.iter().enumerate() {
         let at = setting.first_unix_ms;
         if !(from..=to).contains(&at) {
             continue;
         }
         let before = place.checked_sub(1).map(|before| &settings[before]);
-        let was = match before.filter(|before| before.address == setting.address) {
-            Some(before) => format!("it was {}", before.text),
-            None => "what it was before is not recorded".to_owned(),
+        let (to, was) = match before.filter(|before| before.address == setting.address) {
+            Some(before) => (&mut said, format!("it was {}", before.text)),
+            None => (&mut first, "what it was before is not recorded".to_owned()),
         };
         let text =
             format!("its setting {} was read, or written, as {}; {was}", setting.mnemonic, setting.text);
-        said.push(Sentence::of(Certainty::Seen, text).at(at));
+        to.push(Sentence::of(Certainty::Seen, text).at(at));
     }
+    // A report and a backup read all of them, which is no news.
+    if first.len() > FIRST_SEEN {
+        let at = first.iter().filter_map(|sentence| sentence.time_unix_ms).min().unwrap_or(from);
+        let text = format!(
+            "{} of its settings were read, or written, for the first time from then on, as by a report or a backup: what they were before is not recorded",
+            first.len()
+        );
+        first = vec![Sentence::of(Certainty::Seen, text).at(at)];
+    }
+    said.append(&mut first);
     Ok(said)
 }
 

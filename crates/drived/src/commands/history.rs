@@ -46,7 +46,7 @@ pub(crate) struct Args {
     /// Until when; now unless it is said
     #[arg(long, value_name = "TIME", conflicts_with = "lasts")]
     to: Option<String>,
-    /// For how long, from then on: 30min, 2h, 90d
+    /// For how long, from then on; without --from the last of it: 30min, 2h, 90d
     #[arg(long = "for", value_name = "TIME")]
     lasts: Option<Time>,
     /// Which value, again for each: output_frequency_hz, current_a, state, and so on
@@ -87,19 +87,16 @@ const SHOWN: [Quantity; 5] =
     [Quantity::STATE, Quantity::OUTPUT_FREQUENCY, Quantity::SETPOINT, Quantity::CURRENT, Quantity::TORQUE];
 /// So many rows of values a person is shown at the most, unless the steps are said.
 const ROWS: i64 = 40;
+/// So far back is told where nothing is said.
+const HALF_AN_HOUR_MS: i64 = 1_800_000;
 /// So many steps at the most, whoever reads them.
 const STEPS: i64 = 1_000_000;
 
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let now = Local::now().timestamp_millis();
-    let from = args.from.as_ref().map_or(Ok(now - 1_800_000), |text| moment_of(text))?;
-    let to = match (&args.to, args.lasts) {
-        (Some(to), _) => moment_of(to)?,
-        (None, Some(Time(lasts))) => {
-            from.saturating_add(i64::try_from(lasts.as_millis()).unwrap_or(i64::MAX))
-        }
-        (None, None) => now,
-    };
+    let moment = |text: &Option<String>| text.as_deref().map(moment_of).transpose();
+    let lasts = args.lasts.map(|Time(lasts)| i64::try_from(lasts.as_millis()).unwrap_or(i64::MAX));
+    let (from, to) = meant(now, moment(&args.from)?, moment(&args.to)?, lasts);
     let quantities = args.values.iter().map(|name| named(name)).collect::<Result<Vec<_>, _>>()?;
     let history = args.place.open(&args.name)?;
     if args.csv {
@@ -120,6 +117,15 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// From when to when is meant, by what was said of it.
+fn meant(now: i64, from: Option<i64>, to: Option<i64>, lasts: Option<i64>) -> (i64, i64) {
+    match (from, to, lasts) {
+        (Some(from), None, Some(lasts)) => (from, from.saturating_add(lasts)),
+        (None, None, Some(lasts)) => (now.saturating_sub(lasts), now),
+        (from, to, _) => (from.unwrap_or(now - HALF_AN_HOUR_MS), to.unwrap_or(now)),
+    }
 }
 
 /// The parts of a time in which the clock went on: one, unless it was set back in it. That is told apart from what a program reads.
@@ -391,4 +397,23 @@ fn step(lasts: i64) -> i64 {
     const STEPS: [i64; 13] = [1, 2, 5, 10, 30, 60, 300, 600, 1_800, 3_600, 10_800, 86_400, 604_800];
     let fits = STEPS.into_iter().map(|seconds| seconds * 1_000).find(|step| lasts / step <= ROWS);
     fits.unwrap_or(lasts / ROWS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::meant;
+
+    #[test]
+    fn a_length_of_time_alone_is_the_last_of_it() {
+        const NOW: i64 = 10_000_000;
+        for (from, to, lasts, is) in [
+            (None, None, None, (8_200_000, NOW)),
+            (None, None, Some(180_000), (9_820_000, NOW)),
+            (Some(5_000), None, Some(180_000), (5_000, 185_000)),
+            (Some(5_000), None, None, (5_000, NOW)),
+            (None, Some(9_000_000), None, (8_200_000, 9_000_000)),
+        ] {
+            assert_eq!(meant(NOW, from, to, lasts), is, "{from:?} {to:?} {lasts:?}");
+        }
+    }
 }

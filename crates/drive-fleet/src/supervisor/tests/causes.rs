@@ -192,6 +192,28 @@ fn a_trip_that_is_seen_happening_is_not_found() {
 }
 
 #[test]
+fn a_stop_that_takes_the_command_is_not_told_as_control_that_comes_back() {
+    let mut rig = Rig::controlled();
+    rig.pass(1_500 * MS);
+    // The terminals turn it.
+    rig.drive.run();
+    rig.drive.status.control = Some(Control::Terminals);
+    rig.pass(2_000 * MS);
+    rig.outputs.clear();
+    rig.drive.takes_command = true;
+    rig.stop(StopMode::Ramp);
+    rig.pass(2_000 * MS);
+    assert!(rig.events().contains(&"stop took command"), "{:?}", rig.outputs);
+    assert!(!rig.events().contains(&"control returned"), "nobody has: {:?}", rig.outputs);
+    // The panel takes it and gives it back.
+    rig.drive.status.control = Some(Control::Panel);
+    rig.pass(1_000 * MS);
+    rig.drive.status.control = Some(Control::Bus);
+    rig.pass(1_000 * MS);
+    assert_eq!(rig.events()[rig.events().len() - 2..], ["control taken", "control returned"]);
+}
+
+#[test]
 fn a_start_that_takes_the_command_is_not_told_as_control_that_comes_back() {
     let mut rig = Rig::controlled();
     // So an Altivar 21 stands until it is started.

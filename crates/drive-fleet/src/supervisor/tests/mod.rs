@@ -64,6 +64,8 @@ struct Paper {
     denies_watchdog: bool,
     /// It refuses the write of its watchdog: not now.
     refuses_watchdog: bool,
+    /// A stop takes the command from whoever has it.
+    takes_command: bool,
     /// A stop brings it onto a ramp on which it stays.
     ramps: bool,
     /// It refuses every stop: not now.
@@ -129,6 +131,7 @@ impl Paper {
             keeps_watchdog: false,
             denies_watchdog: false,
             refuses_watchdog: false,
+            takes_command: false,
             ramps: false,
             refuses_stops: false,
             expires_stops: false,
@@ -240,11 +243,19 @@ impl Paper {
                     }
                     self.lease = None;
                 }
+                let other = self.status.control.filter(|of| *of != Control::Bus && self.takes_command);
+                if other.is_some() {
+                    self.status.control = Some(Control::Bus);
+                }
                 let (mode, instead) = match self.stops_by {
                     Some((mode, why)) if mode != asked => (mode, Some(why)),
                     _ => (asked, None),
                 };
-                let stopped = self.status().map(|status| Stopped { instead, ..Stopped::by(mode, status) });
+                let stopped = self.status().map(|status| Stopped {
+                    instead,
+                    taken_from: other,
+                    ..Stopped::by(mode, status)
+                });
                 Reply::stopped(slave(), asked, stopped)
             }
             Job::Withdraw if !self.withdraws => {

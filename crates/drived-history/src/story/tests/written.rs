@@ -197,6 +197,31 @@ fn a_setting_that_was_written_here_stands_beside_what_happened_then() {
     );
 }
 
+/// A backup reads every register.
+#[test]
+fn settings_that_were_only_read_for_the_first_time_do_not_bury_what_happened() {
+    for (read_at_once, sentences) in [(4_u16, 4), (170, 1)] {
+        let mut night = Written::begin(&format!("settings-{read_at_once}"));
+        let settings = (0..read_at_once).map(|address| crate::record::Setting {
+            wall_ms: NIGHT_MS + 295_000 + i64::from(address),
+            read: drived_plant::plant::past::ParameterRead {
+                drive: "pump 1".into(),
+                address,
+                code: "dEC",
+                word: 30,
+                text: "3.0 s".to_owned(),
+            },
+        });
+        night.archive.take(Batch { settings: settings.collect(), ..Batch::default() }, on_wall(296_000));
+        night.event(300_000, "tripped", "tripped: 18 ObF: DC bus overvoltage", None);
+        let course = night.told(300_000).course();
+        let told = course.lines().filter(|line| line.contains("not recorded")).count();
+        assert_eq!(told, sentences, "{course}");
+        assert_eq!(course.contains("170 of its settings were read"), read_at_once == 170, "{course}");
+        assert!(course.contains("tripped"), "{course}");
+    }
+}
+
 #[test]
 fn that_nobody_asked_is_told_only_where_nothing_is_missing() {
     let is_sure = |story: &Story| story.why(Certainty::Seen).contains("nobody here asked for it");
