@@ -410,7 +410,7 @@ impl fmt::Display for EventKind {
             }
             Self::OtherFamily { it_is, .. } => write!(f, ": {it_is}"),
             Self::SetUpOtherwise { because, present } => {
-                write!(f, "{}: {because}", if *present { "" } else { ", not any more" })
+                write!(f, "{}: {because}", if *present { "" } else { ", not any more; it was" })
             }
             Self::RunAdopted(lease) => {
                 write!(

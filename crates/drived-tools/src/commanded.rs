@@ -29,6 +29,9 @@ const STOP_TIME: Duration = Duration::from_secs(5);
 /// Between two words about a stop that is not confirmed.
 const SECOND: Duration = Duration::from_secs(1);
 
+/// What happens within this time is told at once.
+const TOGETHER: Duration = Duration::from_millis(50);
+
 /// From one status to the next, so that the motor is watched while it is commanded.
 const PERIOD: Duration = Duration::from_millis(500);
 
@@ -258,7 +261,7 @@ impl Commanded {
         let mut course = Course::default();
         let mut is_told_why = false;
         while self.has_started && timeout(Duration::ZERO, self.ending.asked()).await.is_ok() {}
-        let outcome = loop {
+        let outcome = 'stop: loop {
             tokio::select! {
                 biased;
                 outcome = stop.finished() => break outcome,
@@ -281,9 +284,15 @@ impl Commanded {
                     for news in course.look(pending, status.motion) {
                         match news {
                             News::Restarted => self.say_restarted(&status),
-                            News::Alarm => self.complain(format_args!(
-                                "{UNCONFIRMED}. {name}: the drive shows {status}; it is waited for all the same"
-                            )),
+                            News::Alarm => {
+                                // Where the stop ends with it, its verdict is the alarm.
+                                if let Ok(outcome) = timeout(TOGETHER, stop.finished()).await {
+                                    break 'stop outcome;
+                                }
+                                self.complain(format_args!(
+                                    "{UNCONFIRMED}. {name}: the drive shows {status}; it is waited for all the same"
+                                ));
+                            }
                             News::Taken => {
                                 self.tell_what_it_took().await;
                                 self.say(format_args!(
@@ -624,6 +633,7 @@ mod tests {
         assert!(failure.starts_with(UNCONFIRMED), "{failure}");
         const WHY: &str = "there is no serial port /dev/no-such-port";
         assert_eq!(times(&one, &format!("the stop cannot be sent yet: {WHY}")).len(), 1, "{:?}", one.said);
+        assert_eq!(times(&one, UNCONFIRMED), [], "its verdict says so, and nothing before: {:?}", one.said);
         let seconds = times(&one, "has not confirmed the stop").len();
         assert!(seconds > 0, "{:?}", one.said);
         assert_eq!(

@@ -396,7 +396,8 @@ fn an_empty_configuration_behind_a_kill_is_an_alarm_of_the_motor_that_runs_and_w
         refused.assert_refused(2, "no drive: expected [[drives]]");
     }
     fs::write(plant.file.path(), format!("{head}\"127.0.0.1:0\"\n")).expect("it can be written");
-    run(&["check", "--config", plant.file.path()]).assert_done();
+    let checked = run(&["check", "--config", plant.file.path()]);
+    assert!(checked.assert_done().contains("has no drive: drived begins with it"), "{checked:?}");
     let mut daemon = plant.daemon();
     daemon.wait_for_log("no drive yet");
     let alarm = loop {

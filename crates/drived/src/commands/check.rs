@@ -127,6 +127,12 @@ fn tell(file: &Path, config: &Config) -> Result<(), Failure> {
             false => "",
         }
     ))?;
+    if config.lines.is_empty() {
+        return output::say(format_args!(
+            "{} has no drive: drived begins with it, and nothing is watched",
+            file.display()
+        ));
+    }
     output::say(format_args!(
         "{} is a configuration that can work; drived plan --config {0} calculates its lines",
         file.display()

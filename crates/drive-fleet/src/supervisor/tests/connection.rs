@@ -528,7 +528,7 @@ fn what_is_set_up_otherwise_is_an_event_once_when_it_begins_and_once_when_it_end
     let all = [
         format!("set up otherwise: {A001}"),
         format!("set up otherwise: {A002}"),
-        format!("set up otherwise, not any more: {A002}"),
+        format!("set up otherwise, not any more; it was: {A002}"),
     ];
     assert_eq!(told, all);
     // Of another drive that is told, and no setting.
