@@ -215,6 +215,10 @@ impl Past for InFile {
     }
 
     fn days(&self, asked: &DaysAsked, given_up: &GivenUp) -> Result<Vec<DayView>, PastError> {
+        // Of a drive that has just been added all of it may wait to be written.
+        if wall_ms() - asked.to_unix_ms <= FLUSHED_EVERY_MS {
+            self.inbox.have_written(WRITTEN_WITHIN);
+        }
         let history = self.open()?;
         let (since, until) = read::bounds(&history.0)?;
         let (Some(since), Some(until)) = (since, until) else { return Ok(Vec::new()) };

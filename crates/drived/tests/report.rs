@@ -57,6 +57,9 @@ fn the_report_of_the_daemon_has_its_drives_groups_and_lines_by_name_and_their_pa
         let told =
             run(&["report", name, "--socket", socket, "--to", to, "--without-parameters", "--overwrite"]);
         assert!(told.assert_done().contains(&format!(": {drives}\n")), "{told:?}");
+        // What was read within the last minute waits to be written, and is written for whoever asks.
+        let told = std::fs::read_to_string(&file).expect("it was written");
+        assert!(!told.contains("Nothing is kept of it."), "it was read a moment ago");
     }
     run(&["report", "pump 3", "--socket", socket, "--to", to, "--overwrite"])
         .assert_refused(2, "no drive and no group");
