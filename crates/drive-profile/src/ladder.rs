@@ -383,13 +383,14 @@ impl<'a> Ladder<'a> {
                         "see its setting",
                     );
                 } else if watchdog.from_factory == Answer::Given(false) {
-                    let off = "its communication watchdog is off from the factory";
                     match (watchdog.time.given(), &watchdog.fed_by) {
                         (Some(_), Answer::Given(FedBy::AnyRequest)) => self.warn(
-                            &format!("{off}; whoever polls it reads how it is set, and feeds it"),
+                            "its communication watchdog is off from the factory; whoever polls it reads how it is set, and feeds it",
                             "set it at the drive",
                         ),
-                        _ => self.warn(off, "set it at the drive"),
+                        _ => {
+                            self.warn("its communication watchdog is off from the factory", "set it at the drive");
+                        }
                     }
                 }
                 if watchdog.fed_by.is_unknown() {
