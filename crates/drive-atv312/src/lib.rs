@@ -10,6 +10,7 @@ mod faults;
 mod intent;
 mod parameters;
 mod proof;
+mod ramp;
 mod reading;
 mod reference;
 pub mod registers;

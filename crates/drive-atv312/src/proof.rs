@@ -14,8 +14,8 @@ use crate::{
     words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, ExtendedStatus3},
 };
 
-/// What has its turn besides the settings' blocks: the limits, `ttO`, `SLL`.
-const TURNS: usize = 3;
+/// What has its turn besides the settings' blocks: the limits, `ttO`, `SLL`, the ramp.
+const TURNS: usize = 4;
 
 /// A further exchange behind a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,6 +34,8 @@ pub(crate) enum Look {
     Analog,
     /// A block of the settings that is not known yet.
     Setting,
+    /// What is not known yet of the ramp.
+    Ramp,
     /// What has its turn.
     Turn(usize),
 }
@@ -66,7 +68,7 @@ impl<P: Port> Atv312<P> {
         if self.proof.watch.is_kept() { 2 * (TURNS + self.known.settings.blocks()) } else { 0 }
     }
 
-    fn wanted(&self, words: &FastWords, status: &Status) -> [(Look, bool); 7] {
+    fn wanted(&self, words: &FastWords, status: &Status) -> [(Look, bool); 8] {
         let settings = &self.known.settings;
         let evidence = self.evidence(words);
         let elsewhere = evidence.is_some() && self.told_reference(words) != Told::Yes;
@@ -83,6 +85,7 @@ impl<P: Port> Atv312<P> {
             (Look::Inputs, elsewhere && settings.has_presets() || blocked && settings.has_stop_inputs()),
             (Look::Analog, elsewhere && sums),
             (Look::Setting, learns),
+            (Look::Ramp, evidence.is_some() && self.known.ramp.can_learn()),
         ]
     }
 
@@ -104,6 +107,7 @@ impl<P: Port> Atv312<P> {
                 self.facts.analog = Some(self.registers.at(class).read_array(AI1C.address()).await?);
             }
             Look::Setting => self.read_a_setting(class).await,
+            Look::Ramp => self.read_ramp(class).await?,
             Look::Turn(turn) if turn % 2 == 0 => self.read_controls(class).await.map(drop)?,
             Look::Turn(turn) => match turn / 2 {
                 0 => self.read_frequency_limits(class).await.map(drop)?,
@@ -115,11 +119,12 @@ impl<P: Port> Atv312<P> {
                     let word = self.registers.at(class).read(SLL).await?;
                     self.proof.watch.finds(SLL.address(), word, Ground::Watchdog);
                 }
+                3 => self.read_ramp_again(class).await?,
                 block => self.read_setting_again(class, block - TURNS).await?,
             },
         }
-        // One setting after the other.
-        if look != Look::Setting {
+        // One after the other.
+        if !matches!(look, Look::Setting | Look::Ramp) {
             self.proof.looked(look);
         }
         Ok(())

@@ -12,6 +12,7 @@ use drive_drivecom::{self as drivecom, Limits, StopWord};
 use crate::{
     Atv312,
     facts::{ANALOG_INPUTS, Facts, SILENT},
+    ramp::Ramp,
     reading::Resolution,
     registers::{
         ATR, CCS, CD1, CD2, CHCF, CMD, DCI, FR1, FR2, FST, NST, PIF, RFC, SA2, SA3, SMIL, STT, TFR, address,
@@ -97,6 +98,7 @@ const FUNCTIONS: [u16; 10] = [
 pub(crate) struct Known {
     pub(crate) resolution: Option<Resolution>,
     pub(crate) settings: Settings,
+    pub(crate) ramp: Ramp,
     /// Whether it is an Altivar 312, once it was asked.
     pub(crate) kind: Option<Recognised>,
     /// What it has said of its size.

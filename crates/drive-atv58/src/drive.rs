@@ -90,6 +90,7 @@ impl<P: Port> Drive for Atv58<P> {
     /// [`StopMode::Ramp`] is the word of the map, the quick stop 0002h where it names none; [`StopMode::DcInjection`], for which
     /// the manual names no bit, is replaced by that ramp.
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
+        self.proof.watch.shaft.is_stopped_by(mode);
         drivecom::stop(self, mode).await
     }
 

@@ -178,7 +178,8 @@ impl<P: Port> Atv58<P> {
             Some(ChartState::OperationEnabled) => Output::Driven,
             _ if turns => Output::Braking(at),
             _ if output.is_none() => Output::Cut,
-            Some(ChartState::QuickStopActive | ChartState::SwitchedOn) if braked => Output::None,
+            Some(ChartState::QuickStopActive) if braked => Output::Ended,
+            Some(ChartState::SwitchedOn) if braked => Output::None,
             // A trip cuts off a motor that was coming down for another reason.
             Some(ChartState::Fault) if reacted => Output::None,
             Some(ChartState::Fault) => Output::Tripped,

@@ -66,6 +66,8 @@ pub enum Output {
     Injection,
     /// There is no output, and the drive has not cut it by itself: a ramp has ended.
     None,
+    /// There is no output, and the drive says that the stop which it was making has come to its end.
+    Ended,
     /// There is no output any more, of a motor that a stop brought down in whose place another may stand by now: only that it had
     /// the time to come down as fast as it was seen to tells a ramp that has ended from a cut.
     Gone,
@@ -91,9 +93,15 @@ pub const INJECTION_AT_MOST: Duration = Duration::from_secs(30);
 /// answers.
 const ROUNDING: u32 = 50;
 
-/// The ramp of an Altivar 312 as it leaves the factory, in hundredths of a hertz: 50 Hz in 3 s (`dEC`, BBV51701 p. 39). Of a drive
-/// whose ramp was not seen none shorter is believed, of whatever family.
-const FACTORY_RAMP: (u32, Duration) = (5_000, Duration::from_secs(3));
+/// The ramp of an Altivar 312 as it leaves the factory: 50 Hz in 3 s (`dEC`, BBV51701 p. 39). Of a drive whose ramp was neither seen nor
+/// [told](Shaft::set_ramp) none shorter is believed, of whatever family.
+const FACTORY_RAMP: (Frequency, Duration) = (Frequency::from_hertz(50), Duration::from_secs(3));
+/// By what a fast stop divides the time of the ramp, as an Altivar 312 leaves the factory (`dCF`, BBV51701 p. 40).
+const FAST_STOP: u32 = 4;
+
+/// For how long a motor with a run command is seen at no output until it is one that has nothing to follow: one that has begins to turn
+/// sooner, and an output that is cut as it does leaves it coasting.
+const AT_ZERO: Duration = Duration::from_secs(1);
 
 /// What was last seen of the shaft, or is to be taken for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -104,9 +112,9 @@ enum Past {
     Unseen,
     /// It stood.
     AtRest,
-    /// It was driven; at `zero`: at no output, to which it was seen to come down. Of one that was so in two statuses behind each other
+    /// It was driven; since `zero`: at no output, to which it was seen to come down. Of one that was `still` so [a while](AT_ZERO) later
     /// nothing is to be expected when the output goes.
-    Driven { zero: bool, still: bool },
+    Driven { zero: Option<Instant>, still: bool },
     /// It was braked.
     Braked { still: bool },
     /// It coasts since then.
@@ -121,6 +129,18 @@ struct Descent {
     rate: Option<(u32, Duration)>,
     /// The last look showed less than the one before it.
     falls: bool,
+}
+
+/// Whether the look is one that none before it can be held against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Sight {
+    /// Nobody has looked yet, or not since the line was lost.
+    #[default]
+    Lost,
+    /// The last look was the first one.
+    First,
+    /// There were others.
+    Kept,
 }
 
 impl Descent {
@@ -138,12 +158,12 @@ impl Descent {
     }
 
     /// Whether an output that is gone at `now` cannot have come down so fast, or hardly: it was cut, whatever the drive says. A third
-    /// faster than it was seen to come down is still a ramp; of one of which nothing was seen that of the factory is.
-    fn is_cut(&self, now: Instant) -> bool {
+    /// faster than it was seen to come down is still a ramp; of one of which nothing was seen its `ramp` is.
+    fn is_cut(&self, now: Instant, ramp: (u32, Duration)) -> bool {
         let counts_in = |(counts, time)| self.until(now, counts, time, ROUNDING);
         match self.rate {
             Some(rate) => counts_in(rate).is_some_and(|(passed, needed)| passed * 4 < needed * 3),
-            None => counts_in(FACTORY_RAMP).is_some_and(|(passed, needed)| passed < needed),
+            None => counts_in(ramp).is_some_and(|(passed, needed)| passed < needed),
         }
     }
 
@@ -180,11 +200,18 @@ impl Descent {
 #[derive(Debug, Clone, Copy)]
 pub struct Shaft {
     past: Past,
+    sight: Sight,
     descent: Descent,
     /// Since when direct current flows into a motor that may turn.
     injected_since: Option<Instant>,
     /// Direct current was asked for since the last look: it may have taken the output, and have ended again.
     may_inject: bool,
+    /// The last stop that was sent is a fast one.
+    stops_fast: bool,
+    /// A freewheel stop was sent since the last look.
+    was_let_go: bool,
+    /// In which time the drive brings it down by how much.
+    ramp: (Frequency, Duration),
     /// How long the motor coasts at the most, where its owner says so.
     coast_time: Option<Duration>,
     /// How long an injection takes to bring it to rest, where its owner says so.
@@ -203,9 +230,13 @@ impl Shaft {
     pub const fn new() -> Self {
         Self {
             past: Past::Unseen,
+            sight: Sight::Lost,
             descent: Descent { last: None, rate: None, falls: false },
             injected_since: None,
             may_inject: false,
+            stops_fast: false,
+            was_let_go: false,
+            ramp: FACTORY_RAMP,
             coast_time: None,
             injection_time: None,
         }
@@ -220,6 +251,18 @@ impl Shaft {
     /// [`INJECTION_TIME`] counts.
     pub const fn set_injection_time(&mut self, time: Option<Duration>) {
         self.injection_time = time;
+    }
+
+    /// In which time the drive brings the motor down by this frequency, as it has told; `None`: it has not, and the ramp of the factory
+    /// counts where none was seen.
+    pub fn set_ramp(&mut self, ramp: Option<(Frequency, Duration)>) {
+        self.ramp = ramp.unwrap_or(FACTORY_RAMP);
+    }
+
+    /// The ramp of the stop that was sent, in hundredths of a hertz.
+    const fn ramp(&self) -> (u32, Duration) {
+        let (frequency, time) = self.ramp;
+        (frequency.centihertz() * if self.stops_fast { FAST_STOP } else { 1 }, time)
     }
 
     /// How long direct current is to be held until the motor stands: as its owner says, else [`INJECTION_TIME`]; never longer
@@ -239,6 +282,8 @@ impl Shaft {
     /// have flowed for a moment between them, and a motor that turned coasts.
     pub const fn is_stopped_by(&mut self, mode: StopMode) {
         self.may_inject |= matches!(mode, StopMode::DcInjection);
+        self.stops_fast = matches!(mode, StopMode::Fast);
+        self.was_let_go |= matches!(mode, StopMode::Freewheel);
     }
 
     /// A motor that was seen at rest may have turned since, by what was seen of it besides a status, or not seen at all: without an
@@ -247,6 +292,11 @@ impl Shaft {
         if self.past == Past::AtRest {
             self.past = Past::Unseen;
         }
+    }
+
+    /// Whether it was let coast by this side since the last look.
+    pub(crate) const fn was_let_go(&self) -> bool {
+        self.was_let_go
     }
 
     /// Whether the last status showed it being brought down.
@@ -261,21 +311,29 @@ impl Shaft {
         self.descent.falls
     }
 
+    /// Whether the last look was the first one, or the first behind a lost line: whether the output goes up or down it does not show.
+    #[must_use]
+    pub const fn is_seen_first(&self) -> bool {
+        matches!(self.sight, Sight::First)
+    }
+
     /// What a status shows at `at`, with the output frequency that the drive tells.
     pub fn see(&mut self, at: Instant, shown: Output, frequency: Option<Frequency>) -> Motion {
         if shown == Output::NotKnown {
             // The next look goes on from the one before.
             return Motion::NotKnown;
         }
+        self.sight = if self.sight == Sight::Lost { Sight::First } else { Sight::Kept };
         let turns = frequency.is_some_and(|frequency| frequency != Frequency::ZERO);
         let mut descent = std::mem::take(&mut self.descent);
         let shown = match shown {
             Output::Tripped => Output::Cut,
-            Output::None if self.was_braked() && descent.is_cut(at) => Output::Cut,
+            Output::None if self.was_braked() && descent.is_cut(at, self.ramp()) => Output::Cut,
             Output::Gone if descent.has_come_down(at) => Output::None,
             Output::Gone => Output::Cut,
             shown => shown,
         };
+        self.was_let_go = false;
         let may_inject = std::mem::take(&mut self.may_inject) && self.past != Past::AtRest;
         if may_inject && !matches!(shown, Output::Driven | Output::Braking(_) | Output::Injection) && !turns {
             self.past = Past::Coasts(at);
@@ -296,7 +354,7 @@ impl Shaft {
                 if let Some(frequency) = frequency {
                     descent.see(at, frequency.centihertz());
                 }
-                (self.past, self.descent) = (Past::Driven { zero: false, still: false }, descent);
+                (self.past, self.descent) = (Past::Driven { zero: None, still: false }, descent);
                 Motion::Driven
             }
             Output::Braking(output) => {
@@ -316,16 +374,18 @@ impl Shaft {
                 (self.past, self.injected_since) = (Past::AtRest, None);
                 Motion::Held
             }
-            Output::None | Output::Gone | Output::Cut | Output::Tripped | Output::Stands if turns => {
+            Output::None | Output::Ended | Output::Gone | Output::Cut | Output::Tripped | Output::Stands
+                if turns =>
+            {
                 // It tells an output all the same: it comes down. Where it was not seen to before, its words are of two moments, and
                 // the output may have been cut between them.
                 match frequency.filter(|_| self.was_braked()) {
                     Some(output) => self.brake(at, output, descent),
-                    None => self.past = Past::Driven { zero: false, still: false },
+                    None => self.past = Past::Driven { zero: None, still: false },
                 }
                 Motion::Braking
             }
-            Output::None | Output::Gone | Output::Cut | Output::Tripped | Output::Stands => {
+            Output::None | Output::Ended | Output::Gone | Output::Cut | Output::Tripped | Output::Stands => {
                 self.without_output(at, shown == Output::Cut)
             }
         }
@@ -340,14 +400,15 @@ impl Shaft {
     /// A run command acts, at no output. It stands where it stood, or was seen to come down so far; else it may coast below a run
     /// command that was given to it since, as after a stop of one moment.
     fn at_zero(&self, at: Instant, descent: Descent) -> Past {
-        let came_down = descent.rate.is_some() && !descent.is_cut(at);
+        let came_down = descent.rate.is_some() && !descent.is_cut(at, self.ramp());
+        let just_now = Past::Driven { zero: Some(at), still: false };
         match self.past {
-            Past::Driven { zero: true, .. } => Past::Driven { zero: true, still: true },
-            Past::AtRest | Past::Braked { still: true } => Past::Driven { zero: true, still: false },
-            Past::Driven { .. } | Past::Braked { .. } if came_down => {
-                Past::Driven { zero: true, still: false }
+            Past::Driven { zero: Some(since), .. } => {
+                Past::Driven { zero: Some(since), still: at.saturating_duration_since(since) >= AT_ZERO }
             }
-            Past::Coasts(since) if self.has_coasted(at, since) => Past::Driven { zero: true, still: false },
+            Past::AtRest | Past::Braked { still: true } => just_now,
+            Past::Driven { .. } | Past::Braked { .. } if came_down => just_now,
+            Past::Coasts(since) if self.has_coasted(at, since) => just_now,
             coasts @ Past::Coasts(_) => coasts,
             _ => Past::Coasts(at),
         }
@@ -569,6 +630,44 @@ mod tests {
         assert_eq!(resting(now).see(now, Output::Gone, Some(Frequency::ZERO)), Motion::AtRest);
     }
 
+    #[tokio::test(start_paused = true)]
+    async fn a_ramp_that_the_drive_has_told_and_a_fast_stop_may_be_over_sooner_than_that_of_the_factory() {
+        let half_a_second = Some((Frequency::from_hertz(50), Duration::from_millis(500)));
+        for (ramp, mode, after, motion) in [
+            (half_a_second, StopMode::Ramp, 310, Motion::AtRest),
+            (half_a_second, StopMode::Ramp, 250, Motion::Coasting),
+            (None, StopMode::Ramp, 460, Motion::Coasting),
+            // 30 Hz in 1.8 s, divided by 4.
+            (None, StopMode::Fast, 460, Motion::AtRest),
+            (None, StopMode::Fast, 400, Motion::Coasting),
+        ] {
+            let (mut shaft, begun) = (Shaft::new(), Instant::now());
+            shaft.set_ramp(ramp);
+            shaft.is_stopped_by(mode);
+            shaft.see(begun, Output::Braking(Frequency::from_hertz(30)), Some(Frequency::from_hertz(30)));
+            let later = begun + Duration::from_millis(after);
+            assert_eq!(
+                shaft.see(later, Output::None, Some(Frequency::ZERO)),
+                motion,
+                "{ramp:?} {mode} {after}"
+            );
+        }
+    }
+
+    /// A quick stop of an Altivar 58 that takes 0.3 s, looked at each 0.3 s.
+    #[tokio::test(start_paused = true)]
+    async fn a_stop_that_the_drive_says_to_have_ended_needs_no_time_and_one_that_was_not_seen_to_begin_does()
+    {
+        let (begun, zero) = (Instant::now(), Some(Frequency::ZERO));
+        let later = begun + Duration::from_millis(300);
+        let mut shaft = Shaft::new();
+        shaft.see(begun, Output::Driven, FIFTY);
+        let mut unseen = shaft;
+        shaft.see(begun, Output::Braking(Frequency::from_hertz(50)), FIFTY);
+        assert_eq!(shaft.see(later, Output::Ended, zero), Motion::AtRest);
+        assert_eq!(unseen.see(later, Output::Ended, zero), Motion::Coasting);
+    }
+
     /// What stood as well: its panel may have run it and let it coast, for however long it was not looked at. So it is at the first look
     /// of a program.
     #[tokio::test(start_paused = true)]
@@ -652,12 +751,17 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_motor_whose_output_was_cut_as_it_began_to_turn_may_coast_and_one_at_zero_speed_stands() {
-        let now = Instant::now();
-        let mut shaft = resting(now);
-        shaft.see(now, Output::Driven, Some(Frequency::ZERO));
-        let mut at_zero = shaft;
-        assert_eq!(shaft.see(now, Output::Cut, Some(Frequency::ZERO)), Motion::Coasting);
-        at_zero.see(now, Output::Driven, Some(Frequency::ZERO));
-        assert_eq!(at_zero.see(now, Output::Cut, Some(Frequency::ZERO)), Motion::AtRest);
+        // An Altivar 58 that was let coast 40 ms behind its start, and had been looked at twice.
+        for (looks, motion) in
+            [(&[0][..], Motion::Coasting), (&[0, 20], Motion::Coasting), (&[0, 500, 1_000], Motion::AtRest)]
+        {
+            let begun = Instant::now();
+            let (mut shaft, after) =
+                (resting(begun), |milliseconds| begun + Duration::from_millis(milliseconds));
+            for at in looks {
+                shaft.see(after(*at), Output::Driven, Some(Frequency::ZERO));
+            }
+            assert_eq!(shaft.see(after(1_010), Output::Cut, Some(Frequency::ZERO)), motion, "{looks:?}");
+        }
     }
 }

@@ -87,13 +87,15 @@ pub struct OwnRun {
     sent: Option<u16>,
     /// The command word as the drive was read to hold it since.
     held: Option<u16>,
+    /// One was given since the shaft was looked at last.
+    unseen: bool,
 }
 
 impl OwnRun {
     /// None was given.
     #[must_use]
     pub const fn new() -> Self {
-        Self { lease: None, before: None, arrived: false, sent: None, held: None }
+        Self { lease: None, before: None, arrived: false, sent: None, held: None, unseen: false }
     }
 
     /// The run command that stands, or may.
@@ -146,7 +148,12 @@ impl OwnRun {
         if let Some(before) = self.lease {
             self.before = Some((before, self.arrived));
         }
-        (self.lease, self.arrived) = (Some(lease), false);
+        (self.lease, self.arrived, self.unseen) = (Some(lease), false, true);
+    }
+
+    /// The shaft is looked at: whether a run command was given since that was done last, by which it may have turned.
+    pub(crate) const fn is_looked_at(&mut self) -> bool {
+        std::mem::replace(&mut self.unseen, false)
     }
 
     /// The drive has confirmed the write.

@@ -49,10 +49,12 @@ impl Watch {
     /// What the shaft does, by what a look at the drive shows: see [`Shaft::see`].
     ///
     /// A motor that was last seen at rest, holds a run command of this side and has tripped by this look, or is being injected into,
-    /// may have turned between the two: it is not told at rest.
+    /// may have turned between the two: it is not told at rest. Nor is one that was given a run command and was let coast between them.
     pub fn see(&mut self, at: Instant, shown: Output, frequency: Option<Frequency>) -> Motion {
         let ends_a_run = matches!(shown, Output::Tripped | Output::Injection);
-        if self.run.lease().is_some() && ends_a_run && self.ended_by != Some(shown) {
+        let ended = self.run.lease().is_some() && ends_a_run && self.ended_by != Some(shown);
+        let given = self.run.is_looked_at();
+        if ended || given && self.shaft.was_let_go() && shown == Output::Cut {
             self.shaft.may_turn();
         }
         self.ended_by = Some(shown).filter(|_| ends_a_run);
@@ -60,8 +62,8 @@ impl Watch {
     }
 
     /// Whether the status that was [seen](Self::see) last shows a motor that slows down although its reference asks for more than its
-    /// `output`: by a stop that the drive does not name, or before it speeds up again. A run command that stands in a drive which runs is
-    /// not shown to be obeyed then. One that is turned round comes down first.
+    /// `output`, or is the first one and does not tell: by a stop that the drive does not name, or before it speeds up again. A run
+    /// command that stands in a drive which runs is not shown to be obeyed then. One that is turned round comes down first.
     #[must_use]
     pub fn is_brought_down(
         &self,
@@ -71,7 +73,8 @@ impl Watch {
     ) -> bool {
         let turns_round =
             self.run.lease().is_some_and(|lease| direction.is_some_and(|seen| seen != lease.direction));
-        self.shaft.falls() && output < reference && !turns_round
+        let may_fall = self.shaft.falls() || self.shaft.is_seen_first();
+        may_fall && output < reference && !turns_round
     }
 
     /// Whether this side has armed the drive's communication watchdog.
@@ -156,6 +159,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
+    use crate::setpoint::StopMode;
 
     #[test]
     fn a_ground_is_told_once_when_it_is_found_otherwise_and_only_while_anything_rests_on_it() {
@@ -204,6 +208,25 @@ mod tests {
         assert_eq!(watch.see(now + Duration::from_secs(10), Output::Tripped, zero), Motion::AtRest);
     }
 
+    /// An Altivar 58 carried out its start and answered by an exception, and was let coast before its next status.
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_was_started_and_let_coast_between_two_looks_may_coast() {
+        let (now, zero) = (Instant::now(), Some(Frequency::ZERO));
+        let mut rests = Watch::default();
+        assert_eq!(rests.see(now, Output::Stands, zero), Motion::AtRest);
+        let mut refused = rests.clone();
+        refused.run.give(Lease::new(Direction::Forward, 1));
+        assert_eq!(refused.see(now, Output::Cut, zero), Motion::AtRest, "the drive is locked");
+        for mut watch in [rests.clone(), refused] {
+            watch.shaft.is_stopped_by(StopMode::Freewheel);
+            assert_eq!(watch.see(now, Output::Cut, zero), Motion::AtRest, "nothing was started since");
+        }
+        rests.run.give(Lease::new(Direction::Forward, 1));
+        rests.run.end();
+        rests.shaft.is_stopped_by(StopMode::Freewheel);
+        assert_eq!(rests.see(now, Output::Cut, zero), Motion::Coasting);
+    }
+
     /// A motor at rest was started, nobody could look for four seconds, and a stop by direct current was given: at the next look it flows.
     #[tokio::test(start_paused = true)]
     async fn a_motor_that_may_have_run_unseen_is_not_held_at_once_by_a_current() {
@@ -229,6 +252,7 @@ mod tests {
         let (begun, hertz) = (Instant::now(), Frequency::from_hertz);
         let mut watch = Watch::default();
         watch.run.give(Lease::new(Direction::Forward, 1));
+        watch.see(begun, Output::Driven, Some(hertz(10)));
         for (at, output, forward, reverse) in
             [(1, 20, false, false), (2, 30, false, false), (3, 25, true, false), (4, 25, false, false)]
         {
@@ -238,6 +262,23 @@ mod tests {
                 assert_eq!((is(30), is(25)), (told, false), "{output} Hz, {direction}");
             }
         }
+    }
+
+    /// An Omron 3G3EV that its panel was stopping, at the first look behind a lost line: its words are those of one that runs up.
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_below_its_reference_is_not_shown_to_obey_by_the_first_look_behind_a_lost_line() {
+        let (begun, hertz) = (Instant::now(), Frequency::from_hertz);
+        let mut watch = Watch::default();
+        watch.run.give(Lease::new(Direction::Forward, 1));
+        let see = |watch: &mut Watch, at, output| {
+            watch.see(begun + Duration::from_secs(at), Output::Driven, Some(hertz(output)));
+            watch.is_brought_down(Some(Direction::Forward), hertz(output), hertz(30))
+        };
+        assert!(see(&mut watch, 1, 10) && !see(&mut watch, 2, 20));
+        watch.lose_sight();
+        assert!(see(&mut watch, 9, 10) && see(&mut watch, 10, 5) && !see(&mut watch, 11, 6));
+        watch.lose_sight();
+        assert!(!see(&mut watch, 19, 30), "it is where its reference is");
     }
 
     /// It was being brought down, the line was lost, and at the next look there is no output: by the ramp, or cut.

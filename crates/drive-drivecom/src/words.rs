@@ -377,7 +377,8 @@ impl StatusWords {
             // A ramp has ended, or a run command stands and asks for nothing.
             ChartState::OperationEnabled if ramps => Output::None,
             ChartState::OperationEnabled if braked => Output::Gone,
-            ChartState::QuickStopActive => Output::None,
+            // Neither voltage nor operation was taken from it: it came to its end.
+            ChartState::QuickStopActive => Output::Ended,
             ChartState::SwitchedOn if braked => Output::None,
             // A trip cuts off a motor that was coming down for another reason.
             ChartState::Fault if braked && reacted => Output::None,

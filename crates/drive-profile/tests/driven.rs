@@ -464,6 +464,35 @@ async fn a_stop_along_the_ramp_ends_at_rest_and_one_that_cuts_the_output_does_no
     }
 }
 
+/// A V20 tells that it operates until its motor stands, on a ramp of 3 s.
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_is_taken_is_told_of_a_motor_that_comes_down_whatever_its_drive_calls_that() {
+    for key in DRIVEN {
+        let mut rig = running(key).await;
+        let stopped = rig.drive.stop(StopMode::Ramp).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        assert_eq!(stopped.status.state, State::Stopping, "{key}");
+        // A WJ200 does not show its output in each status.
+        assert!(matches!(stopped.status.motion, Motion::Braking | Motion::NotKnown), "{key}: {stopped:?}");
+    }
+}
+
+/// What another master has left in HSW: C666h are -45 Hz.
+#[tokio::test(start_paused = true)]
+async fn a_motor_whose_setpoint_is_negative_is_not_started_either_way_until_one_is_given() {
+    let mut rig = rig("v20");
+    rig.drive.status().await.expect("it answers");
+    rig.machine.poke(100, 0xC666);
+    let written = rig.machine.received().iter().filter(|request| !is_read(request)).count();
+    for direction in [Direction::Forward, Direction::Reverse] {
+        let error = rig.drive.start(direction).await.expect_err("its setpoint turns it the other way");
+        assert!(error.to_string().contains("the setpoint that stands in it is negative"), "{error}");
+    }
+    assert_eq!(rig.machine.received().iter().filter(|request| !is_read(request)).count(), written);
+    give(&mut rig, 30).await;
+    rig.drive.start(Direction::Forward).await.expect("it is started");
+    rig.until_machine("it turns forward", |machine| machine.output_frequency == 3_000).await;
+}
+
 fn text(name: &str) -> String {
     let found = shipped::TEXTS.iter().find(|(known, _)| *known == name);
     found.map(|(_, text)| (*text).to_owned()).expect("it is shipped")

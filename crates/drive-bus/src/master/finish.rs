@@ -132,10 +132,16 @@ impl<C> Master<C> {
     fn ask_once_more(&mut self, now: Instant, flight: Flight<C>, result: &Brought, doubted: (Frame, u32)) {
         self.count(now, &flight, result, Ended::Answered);
         self.note_alive(now, flight.slave);
+        self.await_its_own(now);
         if let Purpose::Call(Some(mut entry)) = flight.purpose {
             entry.work.doubted = Some(doubted);
             self.schedule.put_back(entry);
         }
+    }
+
+    /// What came is another question's answer, or may be. Its own may be on its way: whoever is asked now would speak into it.
+    fn await_its_own(&mut self, now: Instant) {
+        self.thrown_away(now);
     }
 
     /// An exchange is over. Gives how long it took, and what came instead of its answer.
@@ -173,6 +179,7 @@ impl<C> Master<C> {
         self.count(now, &flight, result, Ended::Unclear);
         self.station(slave).stats.outcomes.mismatches += 1;
         self.throw_away_for(now, &flight);
+        self.await_its_own(now);
         self.note_alive(now, slave);
         match flight.purpose {
             Purpose::Call(Some(mut entry)) => {

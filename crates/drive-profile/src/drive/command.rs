@@ -2,7 +2,7 @@
 
 use drive_core::{
     Class, Command as Order, Confirming, Control, Direction, Error, ErrorKind, Exchange, Frequency, Lease,
-    Port, Refusal, Result, SETTLED_WITHIN, State, Status, StopMode, Stopped, Withdrawn,
+    Output, Port, Refusal, Result, SETTLED_WITHIN, State, Status, StopMode, Stopped, Withdrawn,
     tokio_modbus::{Request, Response},
 };
 use tokio::time::{Duration, Instant, sleep};
@@ -28,6 +28,10 @@ const NO_SUCH_START: Error =
 const NOT_ALONE: Refusal = Refusal::Settings(
     "the drive does not tell who commands it, and a reset may start the motor by another's run command: see that nothing else commands \
      it, and say so by commands-alone = yes",
+);
+
+const NEGATIVE: Refusal = Refusal::Settings(
+    "the setpoint that stands in it is negative and turns its motor the other way: stop the motor, and give a setpoint before the start",
 );
 
 const NO_SETPOINT: Refusal = Refusal::Settings(
@@ -74,6 +78,9 @@ impl<P: Port> ProfileDrive<P> {
         let Some(action) = profile.start(direction) else { return Err(NO_SUCH_START) };
         if action.starts_by_setpoint() && self.kept.is_none() {
             return Err(self.refused(order, NO_SETPOINT));
+        }
+        if self.holds_negative().await? {
+            return Err(self.refused(order, NEGATIVE));
         }
         if self.agreed.is_none() {
             self.agreed = self.setpoint_held().await;
@@ -218,9 +225,12 @@ impl<P: Port> ProfileDrive<P> {
                 _ => comes_down(&status, first),
             };
             if written.is_ok() && !stands && (seen || falls) {
-                if falls && status.state == State::Running {
+                if let Some(output) =
+                    status.output_frequency.filter(|_| falls && status.state == State::Running)
+                {
                     status.state = State::Stopping;
-                    self.comes_down = status.output_frequency.map(Frequency::centihertz);
+                    status.motion = self.watch.see(Instant::now(), Output::Braking(output), Some(output));
+                    self.comes_down = Some(output.centihertz());
                 }
                 self.watch.run.end();
                 let stopped = Stopped { instead, ..Stopped::by(mode, Status { verdict: None, ..status }) };

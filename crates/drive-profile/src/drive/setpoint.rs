@@ -136,6 +136,26 @@ impl<P: Port> ProfileDrive<P> {
         self.frequency(&words, profile.cell(name)?).map(|frequency| frequency.centihertz().into())
     }
 
+    /// Whether the setpoint that stands in the drive is below zero, by whomever it was given: a run command in either direction would turn
+    /// the motor in the other one.
+    pub(super) async fn holds_negative(&mut self) -> Result<bool> {
+        let profile = self.profile.clone();
+        let file = profile.file();
+        let Some(fact) = file.setpoint.given() else { return Ok(false) };
+        let name = fact.get_ref().register.get_ref();
+        let can =
+            file.named(name).is_some_and(|register| register.signed && register.access != Access::Write);
+        if !can || file.starts_by_setpoint() {
+            return Ok(false);
+        }
+        let mut words = Words::default();
+        for block in profile.blocks(&[name.as_str()].into()) {
+            let read = self.read_block(Class::Command, block).await?;
+            words.keep(block, read);
+        }
+        Ok(profile.cell(name).and_then(|cell| cell.counts(&words)).is_some_and(|counts| counts < 0))
+    }
+
     fn takes(&self, register: &Register, setpoint: Setpoint) -> Result<()> {
         let takes = match setpoint {
             Setpoint::Frequency(_) => matches!(register.unit, UnitName::Hertz | UnitName::Percent),
