@@ -397,13 +397,26 @@ impl StatusWords {
         };
         let control = self.control();
         let command = (control != Control::Bus).then_some(Refusal::NotInControl(control));
-        let turned = frh != Frequency::ZERO && self.asks_for() != lease.direction;
+        let turned =
+            frh != Frequency::ZERO && self.asks_for() != lease.direction || self.turns_against(lease);
         Evidence {
             word: RunWord::NotTold,
             command: Told::unless(command),
             output: if self.is_brought_down(frh, output) { Told::NotTold } else { self.told_output(frh) },
             reference: Told::unless(turned.then_some(SIGN)),
         }
+    }
+
+    /// Whether the motor turns against a run command and is not on its way to obey it: it speeds up, or is where its reference is. Who
+    /// is turned round slows down first.
+    fn turns_against(self, lease: Lease) -> bool {
+        let settled = self.eta.contains(StatusWord::REFERENCE_REACHED)
+            || self.eti.contains(ExtendedStatus::ACCELERATING);
+        self.chart() == Some(ChartState::OperationEnabled)
+            && self.is_turning()
+            && self.eta.direction() != lease.direction
+            && settled
+            && !self.eti.contains(ExtendedStatus::DECELERATING)
     }
 
     /// Whether the motor is driven or may be. A reference of zero asks for nothing.
@@ -554,6 +567,27 @@ mod tests {
     use crate::{DISABLE_VOLTAGE, QUICK_STOP, SHUTDOWN, SWITCH_ON};
 
     use super::*;
+
+    /// A reference that another master has written with a sign: an Altivar 312 that was started forward turns in reverse (ETA bit 15), at
+    /// its reference (bit 10) or on the way there (ETI bit 9), whatever ETI bit 15 says of what is asked for.
+    #[test]
+    fn a_motor_that_turns_against_its_run_command_and_does_not_slow_down_follows_another_reference() {
+        let thirty = Frequency::from_hertz(30);
+        for (eta, eti, follows) in [
+            (0x0627, 0x4012, true),
+            (0x8627, 0x4012, false),
+            (0x8227, 0x4212, false),
+            // It is turned round.
+            (0x8227, 0x4412, true),
+        ] {
+            let evidence = StatusWords::new(eta, eti).evidence(
+                Lease::new(Direction::Forward, 0x000F),
+                thirty,
+                Some(thirty),
+            );
+            assert_eq!(evidence.reference == Told::Yes, follows, "{eta:04X}h {eti:04X}h");
+        }
+    }
 
     #[test]
     fn every_pair_of_words_has_a_state_and_none_outside_the_table_is_called_a_known_one() {

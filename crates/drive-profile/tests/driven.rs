@@ -493,6 +493,15 @@ async fn a_motor_whose_setpoint_is_negative_is_not_started_either_way_until_one_
     rig.until_machine("it turns forward", |machine| machine.output_frequency == 3_000).await;
 }
 
+/// Another master writes D99Ah into HSW, -30 Hz, while the motor runs forward at 30 Hz.
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_whose_sign_another_master_has_turned_round_is_not_the_one_that_was_given() {
+    let mut rig = running("v20").await;
+    rig.machine.poke(100, 0xD99A);
+    let verdict = rig.drive.status().await.expect("it answers").verdict;
+    assert!(matches!(verdict, Some(Verdict::NotInForce { .. })), "{verdict:?}");
+}
+
 fn text(name: &str) -> String {
     let found = shipped::TEXTS.iter().find(|(known, _)| *known == name);
     found.map(|(_, text)| (*text).to_owned()).expect("it is shipped")

@@ -222,10 +222,14 @@ impl<P: Port> ProfileDrive<P> {
         }
     }
 
-    /// The setpoint as the drive shows it, in hundredths of a hertz, or in counts where they cannot be told so.
+    /// The setpoint as the drive shows it, in hundredths of a hertz, or in counts where they cannot be told so. In the register that takes
+    /// it a sign is somebody else's, for none is ever written; another one may show by it which way the motor is commanded.
     pub(super) fn setpoint_seen(&self, words: &Words) -> Option<i64> {
         let setpoint = self.sight.setpoint?;
+        let is_negative =
+            self.sight.shows_own_setpoint && setpoint.counts(words).is_some_and(|counts| counts < 0);
         match self.frequency(words, setpoint) {
+            Some(frequency) if is_negative => Some(-i64::from(frequency.centihertz())),
             Some(frequency) => Some(i64::from(frequency.centihertz())),
             None => setpoint.counts(words),
         }
