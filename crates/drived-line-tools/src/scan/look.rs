@@ -24,6 +24,10 @@ const WATCHDOG: u32 = 4;
 /// How often something is asked that takes several exchanges, of which now one and now another is damaged.
 const ASKED: u32 = 12;
 
+/// How often somebody who is there is asked what he does not answer at all: one answer that does not come, or not in time, says nothing of
+/// him.
+const UNANSWERED: u32 = 3;
+
 /// So many refusals of what each drive of a family answers tell that it is none of that family.
 const TELL_TALE: u32 = 2;
 
@@ -218,10 +222,11 @@ enum Asked<T> {
     Damaged,
 }
 
-/// Asks until an answer is intact or refuses, but not for ever. Something short is asked in between: what is damaged every time
-/// while that never is tells more.
+/// Asks until an answer is intact or refuses, or [does not come](UNANSWERED), but not for ever. Something short is asked in between: what
+/// is damaged every time while that never is tells more.
 async fn often<T>(at: At<'_>, mut ask: impl AsyncFnMut() -> Result<T, Error>) -> Asked<T> {
     let At { line, slave, .. } = at;
+    let mut unanswered = 0;
     for _ in 0..ASKED {
         let before = unasked(line);
         let error = match ask().await {
@@ -229,6 +234,11 @@ async fn often<T>(at: At<'_>, mut ask: impl AsyncFnMut() -> Result<T, Error>) ->
             Err(error) => error,
         };
         if !is_damaged(&error, unasked(line) > before) {
+            let is_silence = matches!(error, Error::Port { problem: PortError::Timeout { .. }, .. });
+            unanswered += u32::from(is_silence);
+            if is_silence && unanswered < UNANSWERED {
+                continue;
+            }
             return Asked::Refused;
         }
         if found(at).is_some() {

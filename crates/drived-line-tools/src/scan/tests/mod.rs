@@ -151,6 +151,20 @@ async fn one_read_of_a_watchdog_that_fails_is_no_watchdog_of_a_tenth_of_a_second
     }
 }
 
+#[tokio::test(start_paused = true)]
+async fn an_answer_that_does_not_come_now_and_then_makes_no_unknown_slave_of_a_drive_that_was_found() {
+    for seed in 0..20 {
+        let simulated = SimLine::new(Wiring::rtu(serial("19200 8N1")));
+        simulated.set_faults(drive_sim::Faults::seeded(seed).with(Fault::Lost, ALWAYS / 30));
+        simulated.add_boxed(5, simulated::model(Family::ATV28, SetUp::ForTheBus).unwrap()).unwrap();
+        for find in scanned(&simulated, &at_one("19200 8N1", [5])).await {
+            let Answer::Slave(alike) = &find.answer else { panic!("{seed}: {find:?}") };
+            let families: Vec<_> = alike.iter().map(|alike| alike.family).collect();
+            assert_eq!(families, [Family::ATV28], "{seed}: {find:?}");
+        }
+    }
+}
+
 /// Five families at speeds, formats and protocols of their own, on one line.
 fn mixed(simulated: &SimLine) -> Vec<(SimSlave, Family, Dialect)> {
     let rtu = |text| Dialect { settings: serial(text), protocol: drive_sim::Protocol::Rtu };
