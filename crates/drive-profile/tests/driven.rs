@@ -476,16 +476,18 @@ async fn a_stop_that_is_taken_is_told_of_a_motor_that_comes_down_whatever_its_dr
     }
 }
 
-/// What another master has left in HSW: C666h are -45 Hz.
+/// What another master has left in HSW: C666h are -45 Hz, 7FFFh twice the frequency that P2000 says.
 #[tokio::test(start_paused = true)]
-async fn a_motor_whose_setpoint_is_negative_is_not_started_either_way_until_one_is_given() {
+async fn a_motor_whose_setpoint_nobody_could_have_given_is_not_started_until_one_is_given() {
     let mut rig = rig("v20");
     rig.drive.status().await.expect("it answers");
-    rig.machine.poke(100, 0xC666);
     let written = rig.machine.received().iter().filter(|request| !is_read(request)).count();
-    for direction in [Direction::Forward, Direction::Reverse] {
-        let error = rig.drive.start(direction).await.expect_err("its setpoint turns it the other way");
-        assert!(error.to_string().contains("the setpoint that stands in it is negative"), "{error}");
+    for (setpoint, why) in [(0xC666, "is negative"), (0x7FFF, "is above what may be given")] {
+        rig.machine.poke(100, setpoint);
+        for direction in [Direction::Forward, Direction::Reverse] {
+            let error = rig.drive.start(direction).await.expect_err(why);
+            assert!(error.to_string().contains(&format!("the setpoint that stands in it {why}")), "{error}");
+        }
     }
     assert_eq!(rig.machine.received().iter().filter(|request| !is_read(request)).count(), written);
     give(&mut rig, 30).await;

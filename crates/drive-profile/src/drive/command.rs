@@ -30,10 +30,6 @@ const NOT_ALONE: Refusal = Refusal::Settings(
      it, and say so by commands-alone = yes",
 );
 
-const NEGATIVE: Refusal = Refusal::Settings(
-    "the setpoint that stands in it is negative and turns its motor the other way: stop the motor, and give a setpoint before the start",
-);
-
 const NO_SETPOINT: Refusal = Refusal::Settings(
     "its setpoint is its run command, and none was given since it was reached: give it one, then start it",
 );
@@ -79,8 +75,8 @@ impl<P: Port> ProfileDrive<P> {
         if action.starts_by_setpoint() && self.kept.is_none() {
             return Err(self.refused(order, NO_SETPOINT));
         }
-        if self.holds_negative().await? {
-            return Err(self.refused(order, NEGATIVE));
+        if let Some(reason) = self.refuses_standing().await? {
+            return Err(self.refused(order, reason));
         }
         if self.agreed.is_none() {
             self.agreed = self.setpoint_held().await;

@@ -222,8 +222,8 @@ impl<P: Port> ProfileDrive<P> {
         }
     }
 
-    /// The setpoint as the drive shows it, in hundredths of a hertz, or in counts where they cannot be told so. In the register that takes
-    /// it a sign is somebody else's, for none is ever written; another one may show by it which way the motor is commanded.
+    /// The setpoint as the drive shows it, in hundredths of a hertz, or in counts where they cannot be told so. In a register that
+    /// takes it and no more a sign is somebody else's; another one may show by it which way the motor is commanded.
     pub(super) fn setpoint_seen(&self, words: &Words) -> Option<i64> {
         let setpoint = self.sight.setpoint?;
         let is_negative =

@@ -27,6 +27,13 @@ const HELD_BACK: Refusal = Refusal::Settings(
     "its setpoint is its run command, and the motor does not run by the one that was given: stop it, then start it",
 );
 
+const NEGATIVE: Refusal = Refusal::Settings(
+    "the setpoint that stands in it is negative and turns its motor the other way: stop the motor, and give a setpoint before the start",
+);
+const TOO_HIGH: Refusal = Refusal::Settings(
+    "the setpoint that stands in it is above what may be given to it: give one before the start",
+);
+
 const NO_FULL_SCALE: Refusal = Refusal::Settings(
     "the drive counts in percent of a frequency that it does not tell: say it by full-scale, or give a setpoint in percent",
 );
@@ -136,24 +143,32 @@ impl<P: Port> ProfileDrive<P> {
         self.frequency(&words, profile.cell(name)?).map(|frequency| frequency.centihertz().into())
     }
 
-    /// Whether the setpoint that stands in the drive is below zero, by whomever it was given: a run command in either direction would turn
-    /// the motor in the other one.
-    pub(super) async fn holds_negative(&mut self) -> Result<bool> {
+    /// Why the setpoint that stands in the drive, by whomever it was given, is none to start by: a sign would turn the motor the other
+    /// way, whichever is commanded, and what is beyond the limits would be refused to whoever gave it.
+    pub(super) async fn refuses_standing(&mut self) -> Result<Option<Refusal>> {
         let profile = self.profile.clone();
         let file = profile.file();
-        let Some(fact) = file.setpoint.given() else { return Ok(false) };
-        let name = fact.get_ref().register.get_ref();
-        let can =
-            file.named(name).is_some_and(|register| register.signed && register.access != Access::Write);
-        if !can || file.starts_by_setpoint() {
-            return Ok(false);
+        let Some(fact) = file.setpoint.given().map(crate::format::Spanned::get_ref) else { return Ok(None) };
+        let name = fact.register.get_ref();
+        let Some(register) = file.named(name).filter(|register| register.access != Access::Write) else {
+            return Ok(None);
+        };
+        if file.starts_by_setpoint() {
+            return Ok(None);
         }
-        let mut words = Words::default();
+        let mut words = self.limits(fact).await?;
         for block in profile.blocks(&[name.as_str()].into()) {
             let read = self.read_block(Class::Command, block).await?;
             words.keep(block, read);
         }
-        Ok(profile.cell(name).and_then(|cell| cell.counts(&words)).is_some_and(|counts| counts < 0))
+        let Some(cell) = profile.cell(name) else { return Ok(None) };
+        let hertz = self.hertz_of(&words, cell);
+        // A highest that its owner has not said bounds only what is given.
+        let highest = self.highest(fact, register, hertz, &words).map_or(i64::MAX, |(highest, _)| highest);
+        Ok(cell.counts(&words).and_then(|counts| match counts {
+            ..0 => Some(NEGATIVE),
+            counts => (counts > highest).then_some(TOO_HIGH),
+        }))
     }
 
     fn takes(&self, register: &Register, setpoint: Setpoint) -> Result<()> {
@@ -213,23 +228,7 @@ impl<P: Port> ProfileDrive<P> {
         let count =
             counts(value, scale[0], scale[1]).ok_or_else(|| problem(SetpointProblem::Resolution(step)))?;
         let limits = fact.limits.get_ref();
-        let mut high = i64::from(limits.high);
-        // Also what 100 % is.
-        let mut owners = fact.full_scale.as_ref().is_some_and(|name| name.get_ref() == "owner");
-        if let Some(name) = &limits.high_in {
-            let allowed = if name.get_ref() == "owner" {
-                let highest = self.owner.highest.ok_or_else(|| refused(NO_HIGHEST))?;
-                hertz.map(|[numerator, denominator]| {
-                    i64::from(highest.centihertz()).saturating_mul(denominator)
-                        / numerator.saturating_mul(100)
-                })
-            } else {
-                self.allowed(register, name.get_ref(), held)
-            };
-            let allowed = allowed.ok_or_else(|| refused(NO_HIGHEST))?;
-            owners |= name.get_ref() == "owner" && allowed < high;
-            high = high.min(allowed);
-        }
+        let (high, owners) = self.highest(fact, register, hertz, held).ok_or_else(|| refused(NO_HIGHEST))?;
         if !(i64::from(limits.low)..=high).contains(&count) {
             let (outside, is_above) = (self.outside(limits.low.into(), high, scale, setpoint), count > high);
             return Err(problem(match outside {
@@ -243,6 +242,29 @@ impl<P: Port> ProfileDrive<P> {
         let highest = if register.signed { i16::MAX.cast_unsigned() } else { u16::MAX };
         let fits = u16::try_from(count).ok().filter(|count| *count <= highest);
         fits.map(i32::from).ok_or_else(|| problem(SetpointProblem::TooLarge))
+    }
+
+    /// The highest setpoint in counts, and whether its owner's word decides it, also by what 100 % is; `None`: nobody has said it.
+    fn highest(
+        &self,
+        fact: &Fact,
+        register: &Register,
+        hertz: Option<[i64; 2]>,
+        held: &Words,
+    ) -> Option<(i64, bool)> {
+        let limits = fact.limits.get_ref();
+        let high = i64::from(limits.high);
+        let full_scale_is_owners = fact.full_scale.as_ref().is_some_and(|name| name.get_ref() == "owner");
+        let Some(name) = &limits.high_in else { return Some((high, full_scale_is_owners)) };
+        let is_owners = name.get_ref() == "owner";
+        let allowed = if is_owners {
+            let highest = self.owner.highest?;
+            let [numerator, denominator] = hertz?;
+            i64::from(highest.centihertz()).saturating_mul(denominator) / numerator.saturating_mul(100)
+        } else {
+            self.allowed(register, name.get_ref(), held)?
+        };
+        Some((high.min(allowed), full_scale_is_owners || is_owners && allowed < high))
     }
 
     fn scale(&self, register: &Register) -> Result<[i64; 2]> {

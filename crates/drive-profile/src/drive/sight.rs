@@ -28,7 +28,7 @@ pub(super) struct Sight {
     pub(super) reference_by: Option<(Test, Proves)>,
     pub(super) output: Option<Cell>,
     pub(super) setpoint: Option<Cell>,
-    /// It is read in the register that takes it.
+    /// It is read in the register that takes it, and no sign of it is the direction of a start.
     pub(super) shows_own_setpoint: bool,
     pub(super) current: Option<Cell>,
     pub(super) speed: Option<Cell>,
@@ -90,11 +90,12 @@ impl Sight {
             reference_by: owned(&owner.reference),
             output: cell(&see.output),
             setpoint: cell(&see.setpoint),
-            shows_own_setpoint: see
-                .setpoint
-                .given()
-                .zip(file.setpoint.given())
-                .is_some_and(|(seen, given)| seen.get_ref() == given.get_ref().register.get_ref()),
+            shows_own_setpoint: !file.starts_by_setpoint()
+                && see
+                    .setpoint
+                    .given()
+                    .zip(file.setpoint.given())
+                    .is_some_and(|(seen, given)| seen.get_ref() == given.get_ref().register.get_ref()),
             current: cell(&see.current),
             speed: cell(&see.speed),
             output_voltage: cell(&see.output_voltage),
