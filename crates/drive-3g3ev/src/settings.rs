@@ -1,4 +1,4 @@
-//! What the drive is set up for: n05 and n40, read when they are first needed, and n39, read anew for what moves the motor.
+//! What the drive is set up for: n40, and n05 and n39, which are read anew for what moves the motor.
 
 use std::time::Duration;
 
@@ -16,7 +16,6 @@ use crate::{
 /// What was read once; `None`: not yet.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Settings {
-    n05: Option<u16>,
     /// n39 as it is in force, as far as is known.
     n39: Option<u16>,
     /// n39 as it was in force before the line was lost.
@@ -29,7 +28,6 @@ impl Settings {
     /// Forgets what a write to this parameter may have changed.
     pub(crate) fn written(&mut self, row: &Row) {
         self.unit_changed |= row.address == N39.address();
-        self.n05 = None;
     }
 
     /// The line was lost: the drive may have been switched off, or be another one.
@@ -125,12 +123,17 @@ impl<P: Port> Drive3g3ev<P> {
         })
     }
 
-    /// Refuses reverse where n05 forbids it: the drive would show OP6.
+    /// Refuses reverse where n05 forbids it: the drive would show OP6. It is read each time, for whoever is refused allows it at the drive.
     pub(crate) async fn check_direction(&mut self, command: Command, direction: Direction) -> Result<()> {
-        if direction == Direction::Reverse && self.n05().await? == 1 {
-            return Err(self.refused(command, Refusal::DirectionForbidden));
+        if direction == Direction::Forward {
+            return Ok(());
         }
-        Ok(())
+        match self.registers.at(Class::Command).read(N05).await {
+            Ok(1) => Err(self.refused(command, Refusal::DirectionForbidden)),
+            // What this drive does not have forbids nothing.
+            Ok(_) | Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, .. }) => Ok(()),
+            Err(error) => Err(error),
+        }
     }
 
     pub(crate) async fn read_watchdog(&mut self) -> Result<Watchdog> {
@@ -175,18 +178,5 @@ impl<P: Port> Drive3g3ev<P> {
 
     pub(crate) const fn refused(&self, command: Command, reason: Refusal) -> Error {
         Error::Refused { slave: self.registers.slave(), command, reason }
-    }
-
-    async fn n05(&mut self) -> Result<u16> {
-        if let Some(value) = self.settings.n05 {
-            return Ok(value);
-        }
-        let value = match self.registers.at(Class::Command).read(N05).await {
-            // What this drive does not have forbids nothing.
-            Err(Error::Exception { meaning: ExceptionMeaning::NoSuchRegister, .. }) => 0,
-            read => read?,
-        };
-        self.settings.n05 = Some(value);
-        Ok(value)
     }
 }

@@ -128,16 +128,20 @@ async fn a_start_is_refused_with_the_reason_and_nothing_is_written() {
     }
 }
 
+/// "Reverse: n05", which somebody changes at the panel, as the refusal tells him to.
 #[tokio::test(start_paused = true)]
-async fn the_forbidden_direction_is_read_again_after_forget() {
+async fn the_forbidden_direction_is_read_again_for_each_start() {
     let (mut drive, machine, _rig) = one();
-    drive.start(Direction::Reverse).await.unwrap();
-    drive.stop(StopMode::Ramp).await.unwrap();
-    machine.poke(0x0105, 1);
-    drive.forget();
-    let error = drive.start(Direction::Reverse).await.unwrap_err();
-    assert!(matches!(error, Error::Refused { reason: Refusal::DirectionForbidden, .. }), "{error}");
-    drive.start(Direction::Forward).await.unwrap();
+    for _ in 0..2 {
+        machine.poke(0x0105, 0);
+        drive.start(Direction::Reverse).await.unwrap();
+        drive.stop(StopMode::Ramp).await.unwrap();
+        machine.poke(0x0105, 1);
+        let error = drive.start(Direction::Reverse).await.unwrap_err();
+        assert!(matches!(error, Error::Refused { reason: Refusal::DirectionForbidden, .. }), "{error}");
+        drive.start(Direction::Forward).await.unwrap();
+        drive.stop(StopMode::Ramp).await.unwrap();
+    }
 }
 
 #[tokio::test(start_paused = true)]

@@ -32,7 +32,11 @@ impl Supervisor {
             Ok(()) => self.setpoint_given(now, setpoint),
             Err(error) => {
                 // Where nothing was sent, the drive holds what it held.
-                self.given.take_if(|_| !matches!(error, Error::Setpoint { .. }));
+                use ErrorKind::{NotSent, Refused, Unsupported};
+                self.given.take_if(|_| {
+                    !matches!(error.kind(), Refused | Unsupported | NotSent)
+                        && !matches!(error, Error::Setpoint { .. })
+                });
                 let is_start =
                     self.active.as_ref().is_some_and(|active| matches!(active.order, Order::Start { .. }));
                 match error.kind() {

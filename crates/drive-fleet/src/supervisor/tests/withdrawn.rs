@@ -81,20 +81,27 @@ fn a_setpoint_that_is_withdrawn_while_it_is_sent_is_one_that_nobody_knows() {
     assert_eq!(rig.snapshot().setpoint, None, "it may stand in the drive or not");
 }
 
-/// `Error::Setpoint`: "The setpoint cannot be given to this drive. Nothing was sent."
+/// `Error::Setpoint`: "The setpoint cannot be given to this drive. Nothing was sent.", and so it is of whatever is refused before.
 #[test]
 fn a_setpoint_that_cannot_be_given_leaves_the_one_that_the_drive_holds() {
-    let mut rig = Rig::ready();
-    rig.order(setpoint(20));
-    rig.pass(500 * MS);
-    let id = rig.order(setpoint(30));
-    let Job::SetSetpoint(refused, _) = rig.begins() else { panic!("it is the next") };
     let problem = drive_core::SetpointProblem::Resolution("a test");
-    let error = Error::Setpoint { slave: slave(), setpoint: refused, problem };
-    rig.machine.handle_reply(rig.now, Reply::Setpoint(Err(error)));
-    rig.collect();
-    assert!(matches!(rig.outcome(id), Some(Outcome::Refused(_))), "{:?}", rig.outcome(id));
-    assert_eq!(rig.snapshot().setpoint, Some(Frequency::from_hertz(20).into()));
+    let given = Frequency::from_hertz(30).into();
+    let command = drive_core::Command::Start(Direction::Reverse);
+    for error in [
+        Error::Setpoint { slave: slave(), setpoint: given, problem },
+        // A 3G3EV whose n05 forbids reverse, asked to start so at another setpoint.
+        Error::Refused { slave: slave(), command, reason: drive_core::Refusal::DirectionForbidden },
+    ] {
+        let mut rig = Rig::ready();
+        rig.order(setpoint(20));
+        rig.pass(500 * MS);
+        let id = rig.order(setpoint(30));
+        assert!(matches!(rig.begins(), Job::SetSetpoint(..)), "it is the next");
+        rig.machine.handle_reply(rig.now, Reply::Setpoint(Err(error)));
+        rig.collect();
+        assert!(matches!(rig.outcome(id), Some(Outcome::Refused(_))), "{:?}", rig.outcome(id));
+        assert_eq!(rig.snapshot().setpoint, Some(Frequency::from_hertz(20).into()));
+    }
 }
 
 #[test]
