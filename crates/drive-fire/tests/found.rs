@@ -84,6 +84,10 @@ fn no_cell_that_was_a_find_is_one_again() {
         ("A:128469787", "an equal stop, confirmed by the answer to the one before it: the matrix was wrong"),
         ("A:72501572", "a 58 told in force while it came down, whose panel gave back control"),
         (
+            "W:156103",
+            "a neighbour asked into the answer of a 312 whose answer to another question had come instead",
+        ),
+        (
             "W:177444",
             "a start that was confirmed, and says that this was four seconds ago: the matrix was wrong",
         ),
@@ -131,6 +135,10 @@ fn no_story_that_was_a_find_is_one_again() {
         (
             "3.3.8.l8.o6.o10.e6.o11.o9.o11",
             "a 312 behind a gateway that doubles: the wait for the answer that was taken last was forgotten for what was owed",
+        ),
+        (
+            "2.3.0.l3.l5.o6.o8.f47x3.o5.o10",
+            "a 58 that was started, answered by exceptions, and was let coast before its next status: told at rest at 0.56 Hz",
         ),
         ("8.3.0.o5.l2.o8.e10.o1.l1", "a V20 whose output is cut in a ramp: told at rest at 6.7 Hz"),
     ] {

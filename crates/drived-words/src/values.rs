@@ -42,7 +42,7 @@ pub const fn stopped(status: Option<&Status>) -> &'static str {
     match status {
         Some(Status { motion: Motion::AtRest, .. }) => "stands still",
         Some(Status { motion: Motion::Held, .. }) => "is held at rest by direct current",
-        Some(Status { motion: Motion::Coasting, .. }) => "has cut its output, the shaft may coast",
+        Some(Status { motion: Motion::Coasting, .. }) => "has no output, the shaft may coast",
         _ => "has taken the stop",
     }
 }

@@ -81,7 +81,7 @@ fn every_verb_goes_to_the_running_daemon_by_the_names_of_its_drives() {
     let out = one.assert_done();
     assert!(out.contains("atv312@1 on line bench") && out.contains("running rev"), "{out}");
     let stopped = daemon.ask(&["stop", "pump 1", "--mode", "freewheel"]);
-    let coasts = "pump 1 has cut its output, the shaft may coast: the drive shows";
+    let coasts = "pump 1 has no output, the shaft may coast: the drive shows";
     assert!(stopped.assert_done().contains(coasts), "{stopped:?}");
     let shown = daemon.ask(&["status", "pump 1"]);
     assert!(shown.assert_done().contains("output off, the shaft may coast"), "{shown:?}");

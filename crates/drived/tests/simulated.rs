@@ -22,7 +22,7 @@ fn a_drive_is_started_watched_and_stopped_by_the_words_that_it_confirms() {
     let out = status.assert_done();
     assert!(out.contains("state             running, reverse") && out.contains("line voltage"), "{out}");
     let stopped = sim.on("atv312@7", &["stop", "--mode", "freewheel"]);
-    let coasts = "atv312@7 has cut its output, the shaft may coast: the drive shows";
+    let coasts = "atv312@7 has no output, the shaft may coast: the drive shows";
     assert!(stopped.assert_done().contains(coasts), "{stopped:?}");
 }
 
