@@ -104,6 +104,8 @@ impl<D: Drive> Judged<D> {
     /// The drive's.
     pub async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
         let told = self.drive.stop(mode).await;
+        let is_driven = told.as_ref().is_ok_and(|stopped| stopped.status.motion == Motion::Driven);
+        assert!(!is_driven, "a stop confirmed of a motor that is told to be driven: {told:?}");
         self.judge(told, |stopped| &stopped.status)
     }
 

@@ -134,9 +134,9 @@ settings! {
         acts(_),
         |to, said| to.settings.accept_resume = said.iter().map(|lack| lack.0.0).collect(),
         tells "cut off" told::resume;
-    /// how long the motor coasts at the most when its output is cut, or was not there when it was first seen or behind
-    /// a lost line; until then it is not told to be at rest. Without it "the shaft may coast" stands until the motor is driven
-    /// again
+    /// how long the motor coasts at the most when its output is cut, was not there when it was first seen or behind a lost line, or
+    /// was gone sooner than the drive is known to come down (a 28 or 58 from 50 Hz: 3 s); until then it is not told to be at rest.
+    /// Without it "the shaft may coast" stands until the motor is driven again
     coast: Parsed<Time> = "none",
         |to, said| to.settings.coast = Some(said.0.0),
         tells "coasts" told::coasts;

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use drive_core::{
-    Direction, ErrorKind, Frequency, Result, StopMode,
+    Direction, ErrorKind, Frequency, Motion, Result, StopMode,
     registers::{Row, Storage},
 };
 use drive_sim::{Observation, Surroundings};
@@ -217,6 +217,10 @@ impl Run {
         }
         match stopped {
             Ok(stopped) => {
+                if stopped.status.motion == Motion::Driven {
+                    // Whoever hears that takes the stop for one that was not taken.
+                    return Err(format!("a stop confirmed of a motor that is told to be driven: {stopped}"));
+                }
                 self.live(SETTLED).await?;
                 let seen = self.scene.seen();
                 if seen.output_frequency.abs() > TOLERANCE {
