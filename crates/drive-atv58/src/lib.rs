@@ -14,11 +14,9 @@ pub mod words;
 
 use std::time::Duration;
 
-use tokio::time::Instant;
-
 use drive_core::{
-    Absent, Capabilities, Class, Direction, ExceptionMeaning, Frequency, Port, Quantity, Registers, Result,
-    Row, SerialSettings, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
+    Absent, Capabilities, Class, Direction, ExceptionMeaning, Port, Quantity, Registers, Result, Row,
+    SerialSettings, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 use drive_drivecom::Proof;
 
@@ -96,8 +94,6 @@ pub struct Atv58<P> {
     /// Which way the motor turned at the last status, and when the run command that was given last was written.
     turning: Option<Direction>,
     turned: Option<Direction>,
-    /// The lowest output at which it was seen to turn against the run command, and when.
-    against: Option<(Frequency, Instant)>,
     /// The registers that this drive lacks.
     absent: Absent,
     map: Atv58Map,
@@ -126,7 +122,6 @@ impl<P: Port> Atv58<P> {
             idle: 0,
             turning: None,
             turned: None,
-            against: None,
             absent: Absent::default(),
             map,
             stops_by_ramp: false,

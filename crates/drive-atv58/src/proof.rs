@@ -1,8 +1,6 @@
 //! What proves a run command of this side from status to status, and what the shaft does: what the ordinary exchange carries, and
 //! what takes a further one, never more than one behind a status.
 
-use std::time::Duration;
-
 use drive_core::{Class, Direction, Evidence, Frequency, Output, Port, Refusal, Result, State, Status, Told};
 use drive_drivecom::{ChartState, ControlWord, follows_frequency};
 use tokio::time::Instant;
@@ -11,10 +9,6 @@ use crate::{Atv58, command::OTHER_REFERENCE, registers::CMD};
 
 /// What has its turn: `CMD` with `W401`, and the limits.
 const TURNS: [Look; 2] = [Look::Control, Look::Limits];
-
-/// A motor that turns against the run command and has not come down for so long does not turn round: the slowest ramp, 999.9 s from 50 Hz,
-/// takes a tenth of a hertz in two seconds.
-const TURNS_ROUND: Duration = Duration::from_secs(3);
 
 /// A further exchange behind a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,10 +62,6 @@ impl<P: Port> Atv58<P> {
     }
 
     pub(crate) fn evidence(&self, status: &Status) -> Option<Evidence> {
-        const AGAINST: Refusal = Refusal::Overridden {
-            by: "whoever turns the motor the other way, the sign of a reference, an input or a key,",
-            remedy: "see which one it is, and start again",
-        };
         self.proof.watch.run.lease()?;
         let chart = status.raw(self.map.status).and_then(ChartState::of);
         let run = ControlWord::run(Direction::Forward).bits();
@@ -86,13 +76,8 @@ impl<P: Port> Atv58<P> {
             word,
             command,
             output: self.told_output(chart, status),
-            reference: match (self.told_reference(status), self.against) {
-                (Told::Yes | Told::NotTold, Some((_, since))) if since.elapsed() > TURNS_ROUND => {
-                    Told::No(AGAINST)
-                }
-                (Told::Yes, Some(_)) => Told::NotTold,
-                (told, _) => told,
-            },
+            // No word of the card tells what the motor is asked for.
+            reference: self.proof.watch.told_by_turning(self.told_reference(status)),
         })
     }
 
@@ -186,15 +171,7 @@ impl<P: Port> Atv58<P> {
             _ => Output::Cut,
         };
         self.turning = status.direction.filter(|_| turns);
-        self.against = self.turning_against(at);
+        self.proof.watch.see_turning(Instant::now(), self.turning, at);
         self.proof.see(status.at, shown, output);
-    }
-
-    /// The lowest output at which the motor was seen to turn against the run command of this side, and when: behind a change of direction
-    /// it comes down along its ramp, and no word of the card tells what the motor is asked for.
-    fn turning_against(&self, at: Frequency) -> Option<(Frequency, Instant)> {
-        let lease = self.proof.watch.run.lease()?;
-        self.turning.filter(|direction| *direction != lease.direction)?;
-        Some(self.against.filter(|(lowest, _)| *lowest <= at).unwrap_or_else(|| (at, Instant::now())))
     }
 }

@@ -1,17 +1,22 @@
 //! What every family keeps of a drive from status to status: [`Watch`].
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, time::Duration};
 
 use tokio::time::Instant;
 
 use crate::{
     lease::{Ground, Lease},
     motion::{Motion, Output, Shaft},
-    own_run::OwnRun,
+    own_run::{OwnRun, Told},
+    refusal::Refusal,
     setpoint::Direction,
     turns::Turns,
     units::Frequency,
 };
+
+/// A motor that turns against the run command and has not come down for so long does not turn round: the slowest ramp, 999.9 s from 50 Hz,
+/// takes a tenth of a hertz in two seconds.
+const TURNS_ROUND: Duration = Duration::from_secs(3);
 
 /// The run command of this side, the shaft, and what a contract rests on: looked at with every status, and what no ordinary
 /// status carries by [`Turns`]. [`watched_by!`](crate::watched_by) tells it as a [`Drive`](crate::Drive) has to.
@@ -31,6 +36,8 @@ pub struct Watch {
     armed: bool,
     /// By what the last look showed a run to have ended: a trip, or direct current.
     ended_by: Option<Output>,
+    /// The lowest output at which the motor was seen to turn against the run command, and when.
+    against: Option<(Frequency, Instant)>,
 }
 
 impl Watch {
@@ -75,6 +82,31 @@ impl Watch {
             self.run.lease().is_some_and(|lease| direction.is_some_and(|seen| seen != lease.direction));
         let may_fall = self.shaft.falls() || self.shaft.is_seen_first();
         may_fall && output < reference && !turns_round
+    }
+
+    /// Which way a status shows the motor to turn, at which output; `None`: it stands, or that is not told.
+    pub fn see_turning(&mut self, at: Instant, direction: Option<Direction>, output: Frequency) {
+        let is_other =
+            self.run.lease().is_some_and(|lease| direction.is_some_and(|seen| seen != lease.direction));
+        let lowest = self.against.filter(|(lowest, _)| *lowest <= output);
+        self.against = is_other.then(|| lowest.unwrap_or((output, at)));
+    }
+
+    /// What is told of the reference by the way in which the motor was [seen](Self::see_turning) to turn, where its words tell `reference`:
+    /// behind a change of direction it comes down along its ramp; whoever does not is turned by another's sign.
+    #[must_use]
+    pub fn told_by_turning(&self, reference: Told) -> Told {
+        const AGAINST: Refusal = Refusal::Overridden {
+            by: "whoever turns the motor the other way, the sign of a reference, an input or a key,",
+            remedy: "see which one it is, and start again",
+        };
+        match (reference, self.against) {
+            (Told::Yes | Told::NotTold, Some((_, since))) if since.elapsed() > TURNS_ROUND => {
+                Told::No(AGAINST)
+            }
+            (Told::Yes, Some(_)) => Told::NotTold,
+            (told, _) => told,
+        }
     }
 
     /// Whether this side has armed the drive's communication watchdog.
@@ -123,6 +155,7 @@ impl Watch {
     pub fn lose_sight(&mut self) {
         self.run.unread();
         self.shaft.lose_sight();
+        self.against = None;
         self.forget_settings();
     }
 
@@ -244,6 +277,32 @@ mod tests {
         watch.run.end();
         assert_eq!(watch.see(now + crate::INJECTION_TIME, Output::Injection, zero), Motion::Held);
         assert_eq!(watch.see(now + crate::INJECTION_TIME, Output::Injection, zero), Motion::Held);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_motor_that_turns_the_other_way_and_does_not_come_down_is_turned_by_another() {
+        let (begun, hertz) = (Instant::now(), Frequency::from_hertz);
+        let mut watch = Watch::default();
+        watch.run.give(Lease::new(Direction::Forward, 1));
+        let mut told = vec![];
+        for (at, direction, output) in [
+            (0, Some(Direction::Forward), 30),
+            // It was told to turn round, and comes down; then it does not any more.
+            (1, Some(Direction::Reverse), 30),
+            (5, Some(Direction::Reverse), 20),
+            (6, Some(Direction::Reverse), 20),
+            (9, Some(Direction::Reverse), 20),
+            (10, None, 0),
+        ] {
+            tokio::time::sleep_until(begun + Duration::from_secs(at)).await;
+            watch.see_turning(Instant::now(), direction, hertz(output));
+            told.push(match watch.told_by_turning(Told::Yes) {
+                Told::Yes => "yes",
+                Told::NotTold => "not told",
+                Told::No(_) => "no",
+            });
+        }
+        assert_eq!(told, ["yes", "not told", "not told", "not told", "no", "yes"]);
     }
 
     /// A panel's STOP brings a motor down whose drive runs until it stands.

@@ -71,6 +71,8 @@ impl<P: Port> ProfileDrive<P> {
         let shown = self.shown(&status, &words);
         let at = status.at.unwrap_or_else(Instant::now);
         status.motion = self.watch.see(at, shown, status.output_frequency);
+        let turns = status.output_frequency.filter(|output| *output != Frequency::ZERO);
+        self.watch.see_turning(at, status.direction.filter(|_| turns.is_some()), turns.unwrap_or_default());
         let evidence = self.evidence(&status, &words);
         status.verdict = self.watch.run.verdict(&evidence);
         Ok((status, words))
@@ -249,6 +251,7 @@ impl<P: Port> ProfileDrive<P> {
             Told::Yes if self.agreed.is_none() || !self.turns_as_commanded(status) => Told::NotTold,
             told => told,
         };
+        let reference = self.watch.told_by_turning(reference);
         let word = match self.watch.run.held() {
             Some(_) => self.watch.run.word(|word| self.is_run(word)),
             None => RunWord::NotTold,
