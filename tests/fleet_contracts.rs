@@ -36,12 +36,12 @@ const CHANGES: &[(Family, &str, u16, u16, Ground)] = &[
 async fn whatever_a_contract_rests_on_is_told_when_somebody_changes_it_in_run_and_nothing_goes_on_as_if_it_stood()
  {
     for (family, name, register, word, ground) in CHANGES {
-        // What takes turns on an Altivar 312 has had its own after 880 statuses.
+        // What takes turns on an Altivar 312 has had its own after 920 statuses.
         let every = Duration::from_millis(300);
         let mut plant = Plant::single(*family, |settings| settings.periods.running = every);
         plant.run_at(30).await;
         // Each setting has had its turn once.
-        sleep(270 * SECOND).await;
+        sleep(280 * SECOND).await;
         let restarts = plant.machine().all_requests();
         let before = plant.machine().peek(*register);
         assert!(before.is_some_and(|before| before != *word), "{family}: {name} is {before:?}");

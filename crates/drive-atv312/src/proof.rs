@@ -14,8 +14,8 @@ use crate::{
     words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, ExtendedStatus3},
 };
 
-/// What has its turn besides the settings' blocks: the limits, `ttO`, `SLL`, the ramp.
-const TURNS: usize = 4;
+/// What has its turn besides the settings' blocks: the limits, `ttO`, `SLL`, the two ramps.
+const TURNS: usize = 5;
 
 /// A further exchange behind a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,7 +119,8 @@ impl<P: Port> Atv312<P> {
                     let word = self.registers.at(class).read(SLL).await?;
                     self.proof.watch.finds(SLL.address(), word, Ground::Watchdog);
                 }
-                3 => self.read_ramp_again(class).await?,
+                3 => self.read_second_ramp(class).await?,
+                4 => self.read_ramp_time(class).await?,
                 block => self.read_setting_again(class, block - TURNS).await?,
             },
         }

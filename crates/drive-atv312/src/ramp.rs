@@ -52,28 +52,40 @@ impl Ramp {
 impl<P: Port> Atv312<P> {
     /// Reads what is not known yet of the ramp: one exchange.
     pub(crate) async fn read_ramp(&mut self, class: Class) -> Result<()> {
-        let mut calls = self.registers.at(class);
-        let ramp = &mut self.known.ramp;
-        let read = if ramp.nominal.is_none() {
-            calls.read(FRS).await.map(|word| ramp.nominal = Some(word))
+        let ramp = self.known.ramp;
+        if ramp.nominal.is_none() {
+            let read = self.registers.at(class).read(FRS).await;
+            self.take_ramp(read, |ramp, word| ramp.nominal = Some(word))
         } else if ramp.increment.is_none() {
-            calls.read(INR).await.map(|word| ramp.increment = Some(word))
+            let read = self.registers.at(class).read(INR).await;
+            self.take_ramp(read, |ramp, word| ramp.increment = Some(word))
         } else if ramp.second.is_none() {
-            calls.read_array(RPS.address()).await.map(|words| ramp.second = Some(words))
+            self.read_second_ramp(class).await
         } else {
-            calls.read(DEC).await.map(|word| ramp.time = Some(word))
-        };
+            self.read_ramp_time(class).await
+        }
+    }
+
+    /// Reads which of two ramps acts, and the second one.
+    pub(crate) async fn read_second_ramp(&mut self, class: Class) -> Result<()> {
+        let read = self.registers.at(class).read_array(RPS.address()).await;
+        self.take_ramp(read, |ramp, words| ramp.second = Some(words))
+    }
+
+    /// Reads the time of the first one.
+    pub(crate) async fn read_ramp_time(&mut self, class: Class) -> Result<()> {
+        let read = self.registers.at(class).read(DEC).await;
+        self.take_ramp(read, |ramp, word| ramp.time = Some(word))
+    }
+
+    fn take_ramp<T>(&mut self, read: Result<T>, take: impl FnOnce(&mut Ramp, T)) -> Result<()> {
+        let ramp = &mut self.known.ramp;
         ramp.refused |= matches!(read, Err(Error::Exception { .. }));
+        let taken = read.map(|read| take(ramp, read));
         if !ramp.can_learn() {
             self.proof.watch.shaft.set_ramp(ramp.rate());
         }
-        read
-    }
-
-    /// Reads again what may be set while the motor turns: one exchange, and the next one where the ramp is learned.
-    pub(crate) async fn read_ramp_again(&mut self, class: Class) -> Result<()> {
-        (self.known.ramp.second, self.known.ramp.time) = (None, None);
-        self.read_ramp(class).await
+        taken
     }
 }
 
