@@ -438,12 +438,12 @@ async fn the_time_of_a_watchdog_is_read_where_its_profile_names_the_register_and
     assert!(said.iter().any(|what| what.contains(told)), "{said:?}");
 }
 
-/// Behind a setpoint below the output a stop does not show before the output is there: until then nothing tells that it has arrived.
+/// Until the output has gone down nothing tells that a stop has arrived, and who asked for it may have gone by then.
 #[tokio::test(start_paused = true)]
 async fn no_run_word_follows_a_stop_that_is_not_seen_yet() {
     let mut rig = watched().await;
     rig.drive.set_setpoint(Frequency::from_hertz(10).into()).await.expect("it takes it");
-    let stopping = tokio::time::timeout(Duration::from_millis(300), rig.drive.stop(StopMode::Ramp)).await;
+    let stopping = tokio::time::timeout(Duration::from_millis(30), rig.drive.stop(StopMode::Ramp)).await;
     assert!(stopping.is_err() && rig.drive.lease().is_some(), "it does not show yet");
     sleep(Duration::from_millis(1)).await;
     let mut words = Vec::new();
@@ -560,4 +560,26 @@ fn a_coil_that_is_accepted_and_takes_long_is_of_unknown_outcome_as_a_register_is
         let error = Error::Exception { slave, exchange, code: 5, meaning };
         assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{function:02X}h");
     }
+}
+
+/// "The register whose number says how many decimals this one has": what it counts before them need not be said.
+#[tokio::test(start_paused = true)]
+async fn an_output_whose_decimals_another_register_tells_is_seen_without_a_scale() {
+    const DECIMALS: u16 = 0x0120;
+    let register = "[register.DEC]\nwhat = \"decimals of the output\"\naddress = 0x0120\naccess = \"read\"\nunit = \"count\"\n\
+        source = \"made\"\n\n[state]";
+    let machine = SIGNED.replacen("[state]", register, 1);
+    let at = machine.find("[register.OUTPUT]").expect("it has one");
+    let (before, output) = machine.split_at(at);
+    let text = [before, &output.replacen("scale = [1, 100]", "decimals_in = \"DEC\"", 1)].concat();
+    let mut rig = rig_of(&machine, &text);
+    assert!(rig.machine.poke(DECIMALS, 2));
+    rig.drive
+        .set_setpoint(Frequency::from_hertz(20).into())
+        .await
+        .expect_err("its setpoint is its run command");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.until_machine("it is at its speed", |machine| machine.output_frequency == 2_000).await;
+    let told = rig.drive.status().await.expect("it answers").output_frequency;
+    assert_eq!(told, Some(Frequency::from_hertz(20)));
 }

@@ -200,7 +200,7 @@ impl<P: Port> ProfileDrive<P> {
         self.registers.owe_judgement();
         let mut confirming = Confirming::begin();
         let settled = Instant::now() + SETTLED_WITHIN;
-        let (mut again, mut first) = (settled, None::<Frequency>);
+        let (mut again, mut first, mut was_at_speed) = (settled, None::<Frequency>, false);
         loop {
             let (mut status, _) = match self.read_status(Class::Command).await {
                 Ok(read) => read,
@@ -215,18 +215,21 @@ impl<P: Port> ProfileDrive<P> {
             let held = self.watch.run.held().map(|held| self.is_run(held));
             // A run word of this side that was late may stand in place of the stop by now.
             let stands = held == Some(true);
-            // Where no run word stands any more, an output that goes down does so by that.
-            let falls = match (held, status.output_frequency) {
-                (Some(false), Some(output)) => status.state == State::Running && has_fallen(output, first),
-                _ => comes_down(&status, first),
+            // To whatever setpoint it may come down by an order before: it is looked after until it stands.
+            let falls = match status.output_frequency {
+                Some(output) => has_fallen(output, first),
+                None => was_at_speed && status.at_reference == Some(false),
             };
+            let is_others = status.control == Some(Control::Local);
+            let falls = falls && status.state == State::Running && !is_others;
+            was_at_speed |= status.at_reference == Some(true);
             if written.is_ok() && !stands && (seen || falls) {
-                if let Some(output) =
-                    status.output_frequency.filter(|_| falls && status.state == State::Running)
-                {
+                if falls {
+                    let output = status.output_frequency;
+                    let shown = output.map_or(Output::NotKnown, Output::Braking);
                     status.state = State::Stopping;
-                    status.motion = self.watch.see(Instant::now(), Output::Braking(output), Some(output));
-                    self.comes_down = Some(output.centihertz());
+                    status.motion = self.watch.see(Instant::now(), shown, output);
+                    self.comes_down = Some(output.map(Frequency::centihertz));
                 }
                 self.watch.run.end();
                 let stopped = Stopped { instead, ..Stopped::by(mode, Status { verdict: None, ..status }) };
@@ -238,7 +241,7 @@ impl<P: Port> ProfileDrive<P> {
                 again = Instant::now() + SETTLED_WITHIN;
             }
             // One that somebody else commands does not obey however long that is waited for, and what it says is told.
-            let because = (status.control == Some(Control::Local)).then_some(OTHERS);
+            let because = is_others.then_some(OTHERS);
             if because.is_some() && Instant::now() >= settled || !confirming.again().await {
                 written.map_err(Error::after_write)?;
                 return Err(self.not_confirmed(order, status, because));

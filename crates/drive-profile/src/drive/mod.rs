@@ -46,8 +46,8 @@ pub struct ProfileDrive<P> {
     has_ended: bool,
     /// A stop of this side that cuts the output was written, and no start was confirmed since: an output that is gone has not come down.
     lets_coast: bool,
-    /// A stop of this side was seen, and the motor may still come down by it: its output then.
-    comes_down: Option<u32>,
+    /// A stop of this side was seen, and the motor may still come down by it: its output then, where it is told.
+    comes_down: Option<Option<u32>>,
 }
 
 impl<P: Port> ProfileDrive<P> {

@@ -52,7 +52,9 @@ impl Profile {
         let decimals = register.decimals_in.as_ref().map(|of| self.place_of(of.get_ref()));
         // What says how many decimals there are is one word, or nobody knows what a count is worth.
         let decimals = decimals.map(|of| of.filter(|(register, ..)| !is_double(register)));
-        let scale = register.scale.as_ref().map(|scale| *scale.get_ref());
+        // Whose decimals another register tells counts whole ones of its unit before them.
+        let whole = register.decimals_in.is_some().then_some([1, 1]);
+        let scale = register.scale.as_ref().map(|scale| *scale.get_ref()).or(whole);
         Some(Cell {
             at: Single { space, address, byte: register.byte },
             order: register.order.filter(|_| is_double(register)),

@@ -1,6 +1,6 @@
 //! What a request is made of: who asks, when it came, its body, and how long he waits.
 
-use std::time::Duration;
+use std::{convert::Infallible, time::Duration};
 
 use axum::{
     Extension,
@@ -92,6 +92,18 @@ impl<S: Send + Sync> FromRequestParts<S> for Wait {
                 Err(Problem::new(StatusCode::BAD_REQUEST, detail))
             }
         }
+    }
+}
+
+/// `?wait=` of a stop, which is one whatever it says: what is not understood is the ordinary time.
+pub(super) struct StoppingWait(pub(super) Duration);
+
+impl<S: Send + Sync> FromRequestParts<S> for StoppingWait {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Infallible> {
+        let said = Wait::from_request_parts(parts, state).await;
+        Ok(Self(said.map_or(WAIT, |Wait(wait)| wait)))
     }
 }
 

@@ -15,7 +15,7 @@ use drive_core::StopMode;
 use tokio::time::Instant;
 
 use super::{
-    ask::{Arrived, By, Named, Sent, Stopping, Viewer, Wait},
+    ask::{Arrived, By, Named, Sent, Stopping, StoppingWait, Viewer, Wait},
     problem::Problem,
     selected::{Selected, StoppingSelected},
 };
@@ -69,7 +69,7 @@ pub(super) async fn stop_drive(
     State(plant): State<Plant>,
     By(caller): By,
     Arrived(arrived): Arrived,
-    Wait(wait): Wait,
+    StoppingWait(wait): StoppingWait,
     Named(name): Named,
     Stopping(said): Stopping,
 ) -> Result<Response, Problem> {
@@ -81,7 +81,7 @@ pub(super) async fn stop_group(
     State(plant): State<Plant>,
     By(caller): By,
     Arrived(arrived): Arrived,
-    Wait(wait): Wait,
+    StoppingWait(wait): StoppingWait,
     Named(name): Named,
     Stopping(said): Stopping,
 ) -> Result<Response, Problem> {
@@ -93,7 +93,7 @@ pub(super) async fn stop_selected(
     State(plant): State<Plant>,
     By(caller): By,
     Arrived(arrived): Arrived,
-    Wait(wait): Wait,
+    StoppingWait(wait): StoppingWait,
     StoppingSelected(drives, said): StoppingSelected,
 ) -> Result<Response, Problem> {
     carry_out(&plant, &caller, stop(Target::Selected(drives), said, arrived), wait).await
@@ -104,7 +104,7 @@ pub(super) async fn stop_all(
     State(plant): State<Plant>,
     By(caller): By,
     Arrived(arrived): Arrived,
-    Wait(wait): Wait,
+    StoppingWait(wait): StoppingWait,
     Stopping(said): Stopping,
 ) -> Result<Response, Problem> {
     carry_out(&plant, &caller, stop(Target::All, said, arrived), wait).await

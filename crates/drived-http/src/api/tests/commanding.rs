@@ -114,6 +114,26 @@ async fn a_stop_with_a_used_id_still_stops() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_stop_whose_wait_is_not_understood_is_a_stop() {
+    let plant = TestPlant::of(1).await;
+    for path in [STOP, "/api/v1/stop"] {
+        for wait in ["wait=40s", "wait=soon", "wait=2s&wait=3s"] {
+            let start = json!({"setpoint": {"frequency_hz": 30.0}});
+            assert_eq!(command(&plant.plant, RUN, &start).await.0, StatusCode::OK);
+            let (status, stop) = command(&plant.plant, &format!("{path}?{wait}"), &json!({})).await;
+            assert!(status.is_success(), "{path}?{wait}: {status} {stop}");
+            sleep(Duration::from_secs(20)).await;
+            assert!(!is_running(&plant, 0), "{path}?{wait}");
+            // Of a start it is none.
+            assert_eq!(
+                command(&plant.plant, &format!("{RUN}?{wait}"), &start).await.0,
+                StatusCode::BAD_REQUEST
+            );
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn an_expired_start_is_never_sent() {
     let plant = TestPlant::of(1).await;
     // A first command holds the drive for longer than the second may wait.
