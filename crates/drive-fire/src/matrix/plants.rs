@@ -120,7 +120,7 @@ const FOUND: &[(&str, &str)] = &[
     ("line: command-sent-late", "E:26300"),
     ("line: lost-write-told-as-expired", "A:200156991"),
     ("line: sent-told-as-unsent", "F:4374893"),
-    ("line: late-answer-unfeared", "F:1853738"),
+    ("line: late-answer-unfeared", "W:29902"),
 ];
 
 /// The same of the stories.
