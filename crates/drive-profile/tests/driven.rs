@@ -476,6 +476,36 @@ async fn a_stop_that_is_taken_is_told_of_a_motor_that_comes_down_whatever_its_dr
     }
 }
 
+/// Whether the write of the setpoint, or what follows it, is lost, either setpoint may stand in the drive: neither is somebody else's.
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_of_which_nobody_knows_whether_it_arrived_leaves_the_run_command_in_force() {
+    for key in DRIVEN {
+        for exchanges in 0..8 {
+            let mut rig = running(key).await;
+            let machine = rig.machine.clone();
+            let until = machine.all_requests() + exchanges;
+            let given = {
+                let falls_silent = async {
+                    while machine.all_requests() < until {
+                        tokio::time::sleep(Duration::from_millis(1)).await;
+                    }
+                    machine.mute();
+                    std::future::pending::<()>().await;
+                };
+                tokio::select! {
+                    given = rig.drive.set_setpoint(Frequency::from_hertz(40).into()) => given,
+                    () = falls_silent => unreachable!("it waits for ever"),
+                }
+            };
+            machine.unmute();
+            tokio::time::sleep(Duration::from_secs(5)).await;
+            let verdict = rig.drive.status().await.expect("it answers").verdict;
+            let is_gone = matches!(verdict, None | Some(Verdict::NotInForce { .. }));
+            assert!(!is_gone, "{key}, mute behind {exchanges}: {verdict:?}, {given:?}");
+        }
+    }
+}
+
 /// Slowed down first, and stopped while it still comes down to its setpoint.
 #[tokio::test(start_paused = true)]
 async fn a_stop_above_the_setpoint_is_taken_as_one_at_it() {

@@ -78,6 +78,8 @@ impl<P: Port> ProfileDrive<P> {
         if let Some(reason) = self.refuses_standing().await? {
             return Err(self.refused(order, reason));
         }
+        // At another one than was given nothing starts.
+        self.agreed_before = None;
         if self.agreed.is_none() {
             self.agreed = self.setpoint_held().await;
         }

@@ -19,7 +19,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
 
     fn adopt(&mut self, lease: Lease) {
         self.watch.adopt(lease);
-        self.agreed = None;
+        (self.agreed, self.agreed_before) = (None, None);
     }
 
     fn forget(&mut self) {

@@ -40,6 +40,8 @@ pub struct ProfileDrive<P> {
     guarded: Guarded,
     /// The setpoint that a run command of this side rests on, as the drive shows it.
     agreed: Option<i64>,
+    /// The one before it, while the drive has not shown that it took the other one: either may stand there.
+    agreed_before: Option<i64>,
     /// The setpoint that the next start gives, in counts: of a drive whose setpoint is its run command.
     kept: Option<i32>,
     /// A word of this side that ends its run command was written, and no start was confirmed since.
@@ -65,6 +67,7 @@ impl<P: Port> ProfileDrive<P> {
             watch: Watch::every(STATUSES_PER_TURN),
             guarded,
             agreed: None,
+            agreed_before: None,
             kept: None,
             has_ended: false,
             lets_coast: false,

@@ -243,7 +243,7 @@ impl<P: Port> ProfileDrive<P> {
     pub(super) fn evidence(&self, status: &Status, words: &Words) -> Evidence {
         let command = owned(words, self.sight.commanded_by.as_ref());
         let seen = self.agreed.and_then(|_| self.setpoint_seen(words));
-        let other = seen.is_some() && self.agreed != seen;
+        let other = seen.is_some() && ![self.agreed, self.agreed_before].contains(&seen);
         let reference = match owned(words, self.sight.reference_by.as_ref()) {
             _ if other => Told::No(OTHER_REFERENCE),
             Told::Yes if self.agreed.is_none() || !self.turns_as_commanded(status) => Told::NotTold,

@@ -57,6 +57,8 @@ impl<P: Port> ProfileDrive<P> {
         };
         self.takes(register, setpoint)?;
         let (status, _) = self.read_status(Class::Command).await?;
+        // Somebody may have set it up otherwise since.
+        self.forget_guards();
         self.guard(order).await?;
         if status.control == Some(Control::Local) {
             return Err(self.refused(order, OTHERS));
@@ -80,15 +82,16 @@ impl<P: Port> ProfileDrive<P> {
         self.see_setpoint(setpoint, word).await.map_err(Error::after_write)
     }
 
-    /// What a start rests on from here on, whatever becomes of the write: another setpoint in its place is not this side's. Gives what it
-    /// rested on before.
+    /// What a start rests on from here on, whatever becomes of the write: another setpoint in its place is not this side's, but the one on
+    /// which it rested before, as long as the drive has not shown that it took this one. Gives that.
     fn agree(&mut self, setpoint: Setpoint) -> Option<i64> {
         let shows = self.profile.file().see.setpoint.given().is_some();
         let agreed = match setpoint {
             Setpoint::Frequency(frequency) if shows => Some(frequency.centihertz().into()),
             _ => None,
         };
-        std::mem::replace(&mut self.agreed, agreed)
+        self.agreed_before = std::mem::replace(&mut self.agreed, agreed);
+        self.agreed_before
     }
 
     /// The setpoint of a drive whose run command it is. It is kept for the next start, and goes only to a motor that runs by this side's.
@@ -343,7 +346,7 @@ impl<P: Port> ProfileDrive<P> {
             };
             first = first.or(status.output_frequency);
             if held && is_borne_out && others.is_none() {
-                self.agreed = self.setpoint_seen(&words);
+                (self.agreed, self.agreed_before) = (self.setpoint_seen(&words), None);
                 return Ok(());
             }
             let only_a_start = held && !runs && others.is_none();
