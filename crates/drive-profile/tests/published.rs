@@ -73,7 +73,7 @@ const MISTAKES: &[Mistake] = &[
         "Buildbotics: the tables of MX2, WJ200, Teco, EM60 and Fuling have no row that stops",
         WJ200,
         &[(
-            "ramp = { steps = [{ write = \"RUN\", coils = [false] }], seen = [\"ready\", \"stopping\", \"not_ready\", \"fault\"], source = \"manual linuxcnc\" }",
+            "ramp = { steps = [{ write = \"RUN\", coils = [false] }], seen = [\"ready\", \"stopping\", \"disabled\", \"not_ready\", \"fault\"], source = \"manual linuxcnc\" }",
             "ramp = \"unknown\"",
         )],
         Refused("the reset is left standing"),
