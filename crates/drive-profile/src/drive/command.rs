@@ -202,7 +202,7 @@ impl<P: Port> ProfileDrive<P> {
         self.registers.owe_judgement();
         let mut confirming = Confirming::begin();
         let settled = Instant::now() + SETTLED_WITHIN;
-        let (mut again, mut first, mut was_at_speed) = (settled, None::<Frequency>, false);
+        let (mut again, mut first, mut was_at_speed) = (settled, None::<Frequency>, self.at_speed);
         loop {
             let (mut status, _) = match self.read_status(Class::Command).await {
                 Ok(read) => read,
@@ -224,7 +224,7 @@ impl<P: Port> ProfileDrive<P> {
             };
             let is_others = status.control == Some(Control::Local);
             let falls = falls && status.state == State::Running && !is_others;
-            was_at_speed |= status.at_reference == Some(true);
+            was_at_speed |= self.at_speed;
             if written.is_ok() && !stands && (seen || falls) {
                 if falls {
                     let output = status.output_frequency;

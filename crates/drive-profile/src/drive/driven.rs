@@ -25,7 +25,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
     fn forget(&mut self) {
         self.watch.lose_sight();
         self.forget_guards();
-        (self.comes_down, self.kept) = (None, None);
+        (self.comes_down, self.kept, self.at_speed) = (None, None, false);
     }
 
     fn recognise(&self, _: &drive_core::Identity) -> Recognised {

@@ -50,6 +50,8 @@ pub struct ProfileDrive<P> {
     lets_coast: bool,
     /// A stop of this side was seen, and the motor may still come down by it: its output then, where it is told.
     comes_down: Option<Option<u32>>,
+    /// The last status told that the motor was at its speed.
+    at_speed: bool,
 }
 
 impl<P: Port> ProfileDrive<P> {
@@ -72,6 +74,7 @@ impl<P: Port> ProfileDrive<P> {
             has_ended: false,
             lets_coast: false,
             comes_down: None,
+            at_speed: false,
         }
     }
 

@@ -100,8 +100,8 @@ impl<P: Port> ProfileDrive<P> {
         let sight = self.sight.clone();
         let output_frequency = sight.output.and_then(|output| self.frequency(words, output));
         let fits = |test: &Option<Test>| test.as_ref()?.fits(words);
-        let at_speed = fits(&sight.at_setpoint) == Some(true);
-        let state = self.coming_down(sight.state(words), output_frequency, at_speed);
+        self.at_speed = fits(&sight.at_setpoint) == Some(true);
+        let state = self.coming_down(sight.state(words), output_frequency);
         let control = match owned(words, sight.commanded_by.as_ref()) {
             Told::Yes => Some(Control::Bus),
             Told::No(_) => Some(Control::Local),
@@ -132,11 +132,13 @@ impl<P: Port> ProfileDrive<P> {
 
     /// Some drives tell that they run until the motor stands: behind a stop of this side, and as long as the output only goes down and does
     /// not stay where the setpoint is, it is stopping. Of one that tells no output it is until it is at its speed again.
-    fn coming_down(&mut self, state: State, output: Option<Frequency>, at_speed: bool) -> State {
+    fn coming_down(&mut self, state: State, output: Option<Frequency>) -> State {
         let output = output.map(Frequency::centihertz);
         let is_down = match (state, self.comes_down, output) {
-            (State::Running, Some(Some(last)), Some(output)) => output < last || output == last && !at_speed,
-            (State::Running, Some(None), None) => !at_speed,
+            (State::Running, Some(Some(last)), Some(output)) => {
+                output < last || output == last && !self.at_speed
+            }
+            (State::Running, Some(None), None) => !self.at_speed,
             _ => false,
         };
         self.comes_down = is_down.then_some(output);
