@@ -506,19 +506,6 @@ async fn a_setpoint_of_which_nobody_knows_whether_it_arrived_leaves_the_run_comm
     }
 }
 
-/// Slowed down first, and stopped while it still comes down to its setpoint.
-#[tokio::test(start_paused = true)]
-async fn a_stop_above_the_setpoint_is_taken_as_one_at_it() {
-    for key in DRIVEN {
-        let mut rig = running(key).await;
-        let _ = rig.drive.set_setpoint(Frequency::from_hertz(5).into()).await;
-        let stopped = rig.drive.stop(StopMode::Ramp).await.unwrap_or_else(|error| panic!("{key}: {error}"));
-        assert_ne!(stopped.status.motion, Motion::Driven, "{key}");
-        let end = rig.until_standstill().await;
-        assert_ne!(end.motion, Motion::Driven, "{key}");
-    }
-}
-
 /// What another master has left in HSW: C666h are -45 Hz, 7FFFh twice the frequency that P2000 says.
 #[tokio::test(start_paused = true)]
 async fn a_motor_whose_setpoint_nobody_could_have_given_is_not_started_until_one_is_given() {

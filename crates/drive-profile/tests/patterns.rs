@@ -438,12 +438,12 @@ async fn the_time_of_a_watchdog_is_read_where_its_profile_names_the_register_and
     assert!(said.iter().any(|what| what.contains(told)), "{said:?}");
 }
 
-/// Until the output has gone down nothing tells that a stop has arrived, and who asked for it may have gone by then.
+/// Behind a setpoint below the output a stop does not show before the output is there: until then nothing tells that it has arrived.
 #[tokio::test(start_paused = true)]
 async fn no_run_word_follows_a_stop_that_is_not_seen_yet() {
     let mut rig = watched().await;
     rig.drive.set_setpoint(Frequency::from_hertz(10).into()).await.expect("it takes it");
-    let stopping = tokio::time::timeout(Duration::from_millis(30), rig.drive.stop(StopMode::Ramp)).await;
+    let stopping = tokio::time::timeout(Duration::from_millis(300), rig.drive.stop(StopMode::Ramp)).await;
     assert!(stopping.is_err() && rig.drive.lease().is_some(), "it does not show yet");
     sleep(Duration::from_millis(1)).await;
     let mut words = Vec::new();

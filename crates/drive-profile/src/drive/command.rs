@@ -217,9 +217,12 @@ impl<P: Port> ProfileDrive<P> {
             let held = self.watch.run.held().map(|held| self.is_run(held));
             // A run word of this side that was late may stand in place of the stop by now.
             let stands = held == Some(true);
-            // To whatever setpoint it may come down by an order before: it is looked after until it stands.
+            // Where no run word stands any more, or where the stop is a setpoint, an output that goes down does so by that. Of a drive that
+            // tells none, that it has left its speed shows it.
+            let is_by_stop = held == Some(false) || profile.file().starts_by_setpoint();
             let falls = match status.output_frequency {
-                Some(output) => has_fallen(output, first),
+                Some(output) if is_by_stop => has_fallen(output, first),
+                Some(_) => comes_down(&status, first),
                 None => was_at_speed && status.at_reference == Some(false),
             };
             let is_others = status.control == Some(Control::Local);
