@@ -108,7 +108,8 @@ async fn every_answer_and_every_refusal_is_as_the_document_says() {
                     assert_eq!(told == 422, !path.ends_with("/stop"), "{asked}: {told}");
                     if method == Method::POST && !path.contains("/alarms/") {
                         let waits = request(&format!("{asked}?wait=1h"), json, json!({}));
-                        assert_eq!(held(plant, &document, path, waits).await, 400, "{asked}");
+                        let told = held(plant, &document, path, waits).await;
+                        assert_eq!(told == 400, !path.ends_with("/stop"), "{asked}: {told}");
                     }
                 }
             }
