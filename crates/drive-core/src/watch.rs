@@ -78,18 +78,19 @@ impl Watch {
         output: Frequency,
         reference: Frequency,
     ) -> bool {
-        let turns_round =
-            self.run.lease().is_some_and(|lease| direction.is_some_and(|seen| seen != lease.direction));
         let may_fall = self.shaft.falls() || self.shaft.is_seen_first();
-        may_fall && output < reference && !turns_round
+        may_fall && output < reference && !self.is_against(direction)
+    }
+
+    /// Whether this is not the direction of the run command of this side.
+    fn is_against(&self, direction: Option<Direction>) -> bool {
+        self.run.lease().is_some_and(|lease| direction.is_some_and(|seen| seen != lease.direction))
     }
 
     /// Which way a status shows the motor to turn, at which output; `None`: it stands, or that is not told.
     pub fn see_turning(&mut self, at: Instant, direction: Option<Direction>, output: Frequency) {
-        let is_other =
-            self.run.lease().is_some_and(|lease| direction.is_some_and(|seen| seen != lease.direction));
         let lowest = self.against.filter(|(lowest, _)| *lowest <= output);
-        self.against = is_other.then(|| lowest.unwrap_or((output, at)));
+        self.against = self.is_against(direction).then(|| lowest.unwrap_or((output, at)));
     }
 
     /// What is told of the reference by the way in which the motor was [seen](Self::see_turning) to turn, where its words tell `reference`:

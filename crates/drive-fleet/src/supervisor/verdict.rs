@@ -33,10 +33,7 @@ impl Supervisor {
             Err(error) => {
                 // Where nothing was sent, the drive holds what it held.
                 use ErrorKind::{NotSent, Refused, Unsupported};
-                self.given.take_if(|_| {
-                    !matches!(error.kind(), Refused | Unsupported | NotSent)
-                        && !matches!(error, Error::Setpoint { .. })
-                });
+                self.given.take_if(|_| !matches!(error.kind(), Refused | Unsupported | NotSent));
                 let is_start =
                     self.active.as_ref().is_some_and(|active| matches!(active.order, Order::Start { .. }));
                 match error.kind() {
