@@ -476,6 +476,37 @@ async fn a_stop_that_is_taken_is_told_of_a_motor_that_comes_down_whatever_its_dr
     }
 }
 
+/// A V20 tells that it operates until its motor stands: on the way to a lower setpoint nothing tells whether it obeys. Each such answer has the
+/// status that is had by then, and whoever repeats the stop sees the motor come to rest.
+#[tokio::test(start_paused = true)]
+async fn a_stop_on_the_way_to_a_lower_setpoint_is_told_by_young_statuses_until_it_shows() {
+    let mut untold = Vec::new();
+    for key in ["danfoss-fc", "goodrive", "ig5a", "v20", "g120"] {
+        let mut rig = running(key).await;
+        give(&mut rig, 5).await;
+        assert!(rig.machine.observe().output_frequency > 1_000, "{key}: it is on its way");
+        let mut answers = 0;
+        loop {
+            answers += 1;
+            assert!(answers < 30, "{key}: it never shows");
+            let asked = tokio::time::Instant::now();
+            let Err(error) = rig.drive.stop(StopMode::Ramp).await else { break };
+            let Error::NotConfirmed { status, because: None, .. } = &error else { panic!("{key}: {error}") };
+            assert!(status.output_frequency.is_some(), "{key}: {error}");
+            assert!(
+                asked.elapsed() < drive_core::CONFIRMED_WITHIN * 3 / 4,
+                "{key}: it is told after {:?}",
+                asked.elapsed()
+            );
+        }
+        if answers > 1 {
+            untold.push(key);
+        }
+        rig.until_standstill().await;
+    }
+    assert!(untold.contains(&"v20"), "{untold:?}");
+}
+
 /// Whether the write of the setpoint, or what follows it, is lost, either setpoint may stand in the drive: neither is somebody else's.
 #[tokio::test(start_paused = true)]
 async fn a_setpoint_of_which_nobody_knows_whether_it_arrived_leaves_the_run_command_in_force() {

@@ -13,6 +13,7 @@ use crate::{
     cause::Cause,
     event::EventKind,
     outcome::{Outcome, Refused, StopModes, Unconfirmed, Unknown},
+    settings::Times,
     snapshot::{Link, PendingStop},
     stop_order::{StopOrder, strength},
 };
@@ -63,7 +64,7 @@ pub(super) struct Stopping {
     taken: bool,
     /// Since when the drive injects for it.
     injects_since: Option<Instant>,
-    /// The lowest output since it was taken.
+    /// The lowest output since it was given, and anew since it was taken.
     lowest: Option<Frequency>,
     /// When it is sent next; `None` while the drive has taken it.
     next_try: Option<Instant>,
@@ -122,6 +123,7 @@ impl Stopping {
     /// from when the stop was given, however often it is taken.
     fn takes(&mut self, now: Instant, standstill: Duration) {
         self.taken = true;
+        self.lowest = None;
         self.alarm_at = self.alarm_at.map(|at| at.max(self.since + standstill));
         for waiter in &mut self.waiters {
             waiter.until = match waiter.asker.is_exit() {
@@ -157,6 +159,29 @@ impl Stopping {
             self.alarm_at = self.alarm_at.map(|_| now + standstill.min(HANGS));
             for waiter in &mut self.waiters {
                 waiter.until = waiter.until.max(now + standstill);
+            }
+        }
+    }
+
+    /// The output sinks, and nothing tells whether by this stop or by a lower setpoint that was given before: it is waited for as long as
+    /// it does, for that ends at the setpoint, and below it the motor obeys. Not where something is known to keep the stop from the motor,
+    /// and for no longer than a stop has that was taken.
+    fn sinks(&mut self, now: Instant, output: Option<Frequency>, times: &Times) {
+        let is_denied = match &self.error {
+            None | Some(Error::NotConfirmed { because: None, .. }) => false,
+            Some(_) => true,
+        };
+        let Some(output) = output.filter(|_| !is_denied && !self.was_undone) else { return };
+        let Some(lowest) = self.lowest else {
+            self.lowest = Some(output);
+            return;
+        };
+        if output.centihertz() + PROGRESS.centihertz() <= lowest.centihertz() {
+            self.lowest = Some(output);
+            let until = (now + times.stop_alarm).min(self.since + times.standstill);
+            self.alarm_at = self.alarm_at.map(|at| at.max(until));
+            for waiter in &mut self.waiters {
+                waiter.until = waiter.until.max(until);
             }
         }
     }
@@ -237,6 +262,7 @@ impl Supervisor {
         let until = if asker.is_exit() { now + EXIT } else { now + patience };
         let mut waiter = Waiter { asker: asker.clone(), asked: order, asked_at: now, until, is_told: false };
         let of_another = self.checks.is_another() && asker.id().is_some();
+        let output = self.status.as_ref().and_then(|status| status.value.output_frequency);
         match &mut self.stopping {
             Some(stopping) => {
                 stopping.of_another |= of_another;
@@ -274,7 +300,7 @@ impl Supervisor {
                     of_another,
                     taken: false,
                     injects_since: None,
-                    lowest: None,
+                    lowest: output,
                     next_try: Some(now),
                     pause: REPEAT.0,
                     error: None,
@@ -361,7 +387,8 @@ impl Supervisor {
     pub(super) fn judge_stop(&mut self, now: Instant) {
         let (Some(status), Some(stopping)) = (&self.status, &mut self.stopping) else { return };
         let (at, motion, output) = (status.at, status.value.motion, status.value.output_frequency);
-        let standstill = self.settings.times.standstill;
+        let times = &self.settings.times;
+        let standstill = times.standstill;
         let (is_known, is_another) = (self.checks.stranger().is_none(), self.checks.is_another());
         if stopping.attempts == 0 {
             return;
@@ -374,7 +401,11 @@ impl Supervisor {
             _ if injects && injected_for.is_some_and(|time| time >= INJECTION_AT_MOST) => {
                 stopping.go_on_by_ramp(now);
             }
-            _ if crate::mutant!("untaken-stop-confirmed", !stopping.taken, false) => {}
+            _ if crate::mutant!("untaken-stop-confirmed", !stopping.taken, false) => {
+                if motion == Motion::Driven {
+                    stopping.sinks(now, output, times);
+                }
+            }
             Motion::Driven if crate::mutant!("run-behind-a-stop-left", true, false) => {
                 stopping.undone(now, &status.value, standstill);
             }

@@ -1,8 +1,9 @@
 //! Start, stop, withdrawal and reset: what is written, step by step, and how it is seen.
 
 use drive_core::{
-    Class, Command as Order, Confirming, Control, Direction, Error, ErrorKind, Exchange, Frequency, Lease,
-    Output, Port, Refusal, Result, SETTLED_WITHIN, State, Status, StopMode, Stopped, Withdrawn,
+    CONFIRMED_WITHIN, Class, Command as Order, Confirming, Control, Direction, Error, ErrorKind, Exchange,
+    Frequency, Lease, Output, Port, Refusal, Result, SETTLED_WITHIN, State, Status, StopMode, Stopped,
+    Withdrawn,
     tokio_modbus::{Request, Response},
 };
 use tokio::time::{Duration, Instant, sleep};
@@ -202,6 +203,7 @@ impl<P: Port> ProfileDrive<P> {
         self.registers.owe_judgement();
         let mut confirming = Confirming::begin();
         let settled = Instant::now() + SETTLED_WITHIN;
+        let half = Instant::now() + CONFIRMED_WITHIN / 2;
         let (mut again, mut first, mut was_at_speed) = (settled, None::<Frequency>, self.at_speed);
         loop {
             let (mut status, _) = match self.read_status(Class::Command).await {
@@ -245,9 +247,13 @@ impl<P: Port> ProfileDrive<P> {
                 written = self.write_stop(action, order).await.map_err(Error::after_write)?;
                 again = Instant::now() + SETTLED_WITHIN;
             }
-            // One that somebody else commands does not obey however long that is waited for, and what it says is told.
+            // One that somebody else commands does not obey however long that is waited for, and what it says is told. One that goes down to
+            // a lower setpoint may not tell for as long as that takes whether it obeys: by half the time whoever waits hears that it does.
             let because = is_others.then_some(OTHERS);
-            if because.is_some() && Instant::now() >= settled || !confirming.again().await {
+            let slows = status.output_frequency.is_some_and(|output| has_fallen(output, first));
+            let now = Instant::now();
+            let is_told = because.is_some() && now >= settled || slows && now >= half;
+            if is_told || !confirming.again().await {
                 written.map_err(Error::after_write)?;
                 return Err(self.not_confirmed(order, status, because));
             }

@@ -390,7 +390,7 @@ fn first(rig: &mut Rig, asked: Asked, fate: Fate, job: Job) -> Reply {
                 Stop => drive.run(),
                 _ => {}
             }
-            drive.denies_stops = (asked == Stop).then_some(Refusal::NotInControl(Control::Terminals));
+            drive.denies_stops = (asked == Stop).then_some(Some(Refusal::NotInControl(Control::Terminals)));
         }
         OtherDirection => drive.says = Some(Verdict::lacks(Lack::Reference, ANOTHER_WORD)),
         _ => {}

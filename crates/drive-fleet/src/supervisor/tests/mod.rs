@@ -74,8 +74,8 @@ struct Paper {
     expires_stops: bool,
     /// Its driver sends no stop, because.
     withholds_stops: Option<Refusal>,
-    /// It takes every stop and goes on, because.
-    denies_stops: Option<Refusal>,
+    /// It takes every stop and goes on, and why, where its driver knows.
+    denies_stops: Option<Option<Refusal>>,
     /// It refuses a start, because.
     withholds_starts: Option<Refusal>,
     /// A setpoint is not confirmed, for this reason.
@@ -230,7 +230,8 @@ impl Paper {
             }
             Job::Stop(_) if self.refuses_stops => Reply::Stopped(Err(not_now(8501))),
             Job::Stop(mode) if self.denies_stops.is_some() => {
-                let (slave, command, because) = (slave(), Command::Stop(mode), self.denies_stops);
+                let because = self.denies_stops.flatten();
+                let (slave, command) = (slave(), Command::Stop(mode));
                 let status = Box::new(self.status.clone());
                 Reply::Stopped(Err(Error::NotConfirmed { slave, command, status, because }))
             }

@@ -216,6 +216,70 @@ fn a_ramp_that_hangs_is_an_alarm_in_its_time() {
     assert!(matches!(rig.outcome(id), Some(Outcome::NotConfirmed(_))));
 }
 
+/// A motor on its way to a lower setpoint, whose drive says nothing of a stop before it stands, as a Siemens V20 does.
+fn slowing(from: u16) -> (Rig, CallId) {
+    let mut rig = Rig::ready();
+    rig.drive.run();
+    (rig.drive.status.output_frequency, rig.drive.denies_stops) =
+        (Some(Frequency::from_hertz(from)), Some(None));
+    rig.pass(1_000 * MS);
+    rig.outputs.clear();
+    let id = rig.stop(StopMode::Ramp);
+    (rig, id)
+}
+
+#[test]
+fn a_stop_in_which_the_output_sinks_without_a_word_by_what_is_repeated_and_no_alarm_while_it_does() {
+    let (mut rig, id) = slowing(45);
+    for hertz in (10..45).rev() {
+        rig.drive.status.output_frequency = Some(Frequency::from_hertz(hertz));
+        rig.pass(700 * MS);
+    }
+    assert!(!rig.events().contains(&"stop unconfirmed"), "{:?}", rig.events());
+    assert_eq!(rig.outcome(id), None);
+    assert!(rig.drive.log.iter().filter(|job| matches!(job, Job::Stop(_))).count() > 20, "it is repeated");
+    rig.drive.stand();
+    rig.drive.denies_stops = None;
+    rig.pass(1_000 * MS);
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
+}
+
+#[test]
+fn a_motor_that_only_went_to_its_lower_setpoint_is_an_unconfirmed_stop_once_it_is_there() {
+    let (mut rig, id) = slowing(45);
+    for hertz in (40..45).rev() {
+        rig.drive.status.output_frequency = Some(Frequency::from_hertz(hertz));
+        rig.pass(700 * MS);
+    }
+    assert!(!rig.events().contains(&"stop unconfirmed"), "{:?}", rig.events());
+    rig.pass(2_000 * MS);
+    assert!(rig.events().contains(&"stop unconfirmed"), "{:?}", rig.events());
+    assert!(matches!(rig.outcome(id), Some(Outcome::NotConfirmed(_))));
+}
+
+#[test]
+fn a_motor_that_sinks_for_longer_than_a_stop_has_is_an_unconfirmed_stop() {
+    let (mut rig, id) = slowing(80);
+    for hertz in (0..80).rev() {
+        rig.drive.status.output_frequency = Some(Frequency::from_hertz(hertz + 1));
+        rig.pass(1_000 * MS);
+    }
+    assert!(rig.events().contains(&"stop unconfirmed"), "{:?}", rig.events());
+    assert!(matches!(rig.outcome(id), Some(Outcome::NotConfirmed(_))));
+}
+
+#[test]
+fn a_stop_that_somebody_else_keeps_from_the_motor_is_an_alarm_in_its_time_however_the_output_sinks() {
+    let (mut rig, id) = slowing(45);
+    rig.drive.denies_stops = Some(Some(ANOTHER_WORD));
+    for hertz in (42..45).rev() {
+        rig.drive.status.output_frequency = Some(Frequency::from_hertz(hertz));
+        rig.pass(700 * MS);
+    }
+    assert!(rig.events().contains(&"stop unconfirmed"), "{:?}", rig.events());
+    assert!(matches!(rig.outcome(id), Some(Outcome::NotConfirmed(_))));
+}
+
 #[test]
 fn a_freewheel_is_confirmed_as_an_output_that_is_off_and_a_shaft_that_may_coast() {
     let (mut rig, id) = coming_down();
