@@ -357,6 +357,21 @@ async fn limits_that_are_lowered_at_the_keypad_are_found_in_their_turn_and_hold_
     }
 }
 
+/// Whether `FrH` is kept between the limits no manual says ("before ramp", BBV51701 p. 21): these drives keep it there.
+#[tokio::test(start_paused = true)]
+async fn a_limit_that_is_set_across_the_setpoint_of_a_motor_that_runs_is_no_other_reference() {
+    for family in ALTIVARS {
+        let (hsp, lsp) = (registers(family).hsp, registers(family).hsp + 1);
+        for (limit, word) in [(hsp, 150), (lsp, 300)] {
+            let mut bench = Bench::running(family).await;
+            assert!(bench.rig.machine.poke(limit, word));
+            assert_eq!(bench.told_within(100).await, None, "{family}: {limit}");
+            let runs_at = bench.rig.machine.observe().output_frequency;
+            assert_eq!(runs_at, i32::from(word) * 10, "{family}: {limit}");
+        }
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_motor_that_stands_at_a_setpoint_of_zero_leaves_the_limits_their_turn() {
     for family in ALTIVARS {

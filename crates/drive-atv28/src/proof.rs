@@ -51,7 +51,8 @@ impl<P: Port> Atv28<P> {
         let lacks = |told: fn(&Evidence) -> bool| evidence.as_ref().is_some_and(told);
         let elsewhere = evidence.is_some() && self.told_reference(words) != Told::Yes;
         let doubtful = elsewhere || lacks(|it| it.word == RunWord::NotTold || it.output != Told::Yes);
-        let unlimited = evidence.is_some() && self.proof.limits().is_none();
+        // The limits may have been set otherwise at the drive, across the setpoint: before any other reference is blamed.
+        let unlimited = evidence.is_some() && (elsewhere || self.proof.limits().is_none());
         [(Look::Control, doubtful), (Look::Limits, unlimited), (Look::Speeds, elsewhere)]
     }
 

@@ -146,3 +146,15 @@ async fn each_status_names_what_keeps_our_run_command_from_acting() {
     drive.adopt(Lease::new(Direction::Forward, 0x000F));
     assert_eq!(lacks_within(&mut drive, 10).await, None);
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_limit_across_the_setpoint_is_no_other_reference_whether_it_bounds_frh_or_the_output_alone() {
+    for limit in [[(250, 200), (450, 200), (451, 200)], [(251, 400), (450, 400), (451, 400)]] {
+        for bounded in [450, 0] {
+            let more: Vec<_> = limit.iter().copied().filter(|(at, _)| *at != 450 || *at == bounded).collect();
+            let mut drive = drive(&[&STANDS, &RUNS, &more]);
+            drive.adopt(Lease::new(Direction::Forward, 0x000F));
+            assert_eq!(lacks_within(&mut drive, 20).await, None, "{more:?}");
+        }
+    }
+}

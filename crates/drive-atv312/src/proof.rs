@@ -79,7 +79,8 @@ impl<P: Port> Atv312<P> {
         let learns = self.known.seen && status.state == State::Running && settings.can_learn();
         [
             (Look::Controls, !self.is_plausible(words) || unread || elsewhere || blocked),
-            (Look::Limits, evidence.is_some() && self.proof.limits().is_none()),
+            // They may have been set otherwise at the drive, across the setpoint: before any other reference is blamed.
+            (Look::Limits, evidence.is_some() && (elsewhere || self.proof.limits().is_none())),
             (Look::Speeds, elsewhere),
             (Look::Selection, elsewhere && switched),
             (Look::Inputs, elsewhere && settings.has_presets() || blocked && settings.has_stop_inputs()),

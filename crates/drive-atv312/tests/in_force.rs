@@ -428,6 +428,18 @@ async fn each_status_names_what_keeps_our_run_command_from_acting() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_limit_across_the_setpoint_is_no_other_reference_whether_it_bounds_frh_or_the_output_alone() {
+    for limit in [[(3104, 200), (3203, 200), (3202, 200)], [(3105, 400), (3203, 400), (3202, 400)]] {
+        for bounded in [3203, 0] {
+            let more: Vec<_> =
+                limit.iter().copied().filter(|(at, _)| *at != 3203 || *at == bounded).collect();
+            let mut drive = leased(&more).await;
+            assert_eq!(lacks_within(&mut drive, 20).await, None, "{more:?}");
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn whatever_setting_was_learnt_is_read_again_in_its_turn() {
     let mut drive = leased(&[]).await;
     for _ in 0..1_500 {

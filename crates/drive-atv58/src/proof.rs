@@ -32,9 +32,13 @@ impl<P: Port> Atv58<P> {
                 stands.into(),
                 reference,
             ));
+            let elsewhere = self.told_reference(&status) != Told::Yes;
             let wanted = [
                 (Look::Control, !evidence.is_proven()),
-                (Look::Limits, self.map.speed_limits.is_some() && self.proof.limits().is_none()),
+                (
+                    Look::Limits,
+                    self.map.speed_limits.is_some() && (elsewhere || self.proof.limits().is_none()),
+                ),
             ];
             if let Some(look) = self.proof.choose(None, wanted, TURNS.len(), |turn| TURNS[turn]) {
                 // The status is good without it.
@@ -136,7 +140,9 @@ impl<P: Port> Atv58<P> {
             (_, limits) => limits.flatten().unwrap_or((asked, asked)),
         };
         if !follows_frequency(reference, asked, limits) {
-            return Told::No(OTHER_REFERENCE);
+            // The limits may have been set otherwise at the drive, across the setpoint.
+            let is_judged = self.map.speed_limits.is_none() || self.proof.has_looked(&Look::Limits);
+            return if is_judged { Told::No(OTHER_REFERENCE) } else { Told::NotTold };
         }
         Told::unless(self.proof.given.is_some_and(|(_, given)| given != w401).then_some(WRITTEN_BY_ANOTHER))
     }

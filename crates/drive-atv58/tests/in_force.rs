@@ -130,6 +130,17 @@ async fn each_status_names_what_keeps_our_run_command_from_acting() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_limit_across_the_setpoint_is_no_other_reference_whether_it_bounds_frh_or_the_output_alone() {
+    for limit in [[(250, 200), (450, 200), (451, 200)], [(251, 400), (450, 400), (451, 400)]] {
+        for bounded in [450, 0] {
+            let more: Vec<_> = limit.iter().copied().filter(|(at, _)| *at != 450 || *at == bounded).collect();
+            let mut drive = leased(&more, Atv58Map::default());
+            assert_eq!(lacks_within(&mut drive, 20).await, None, "{more:?}");
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_motor_that_passes_zero_is_not_told_to_be_stopped_at_the_drive_by_one_look() {
     let mut drive = leased(&[(451, 0)], Atv58Map::default());
     assert_eq!(drive.status().await.unwrap().verdict, Some(Verdict::NotKnown));

@@ -9,11 +9,12 @@ const FRH_STEP: u32 = 10;
 /// Two rounded images of one speed, of which one was a frequency of 0.1 Hz on the way, differ by no more rpm than that.
 const SPEED_STEP: u16 = 3;
 
-/// Whether the reference before the ramp, `FrH`, is what the bus asks for, which the drive keeps between its limits.
+/// Whether the reference before the ramp, `FrH`, is what the bus asks for: as it is, or kept between the limits. No manual says which of
+/// the two it is where `LSP` or `HSP` is set across a setpoint (BBV51701 p. 21: "frequency reference before ramp").
 #[must_use]
 pub fn follows_frequency(frh: Frequency, asked: Frequency, (low, high): (Frequency, Frequency)) -> bool {
-    let asked = asked.max(low).min(high);
-    frh.centihertz().abs_diff(asked.centihertz()) <= FRH_STEP
+    let is = |asked: Frequency| frh.centihertz().abs_diff(asked.centihertz()) <= FRH_STEP;
+    is(asked) || is(asked.max(low).min(high))
 }
 
 /// Whether the speed reference at the ramp's input, `FRHD`, is the one that the bus asks for, `LFRD`. An `LFRD` of zero is

@@ -207,6 +207,12 @@ impl<L: Copy + PartialEq> Proof<L> {
         is_another
     }
 
+    /// Whether this look was taken behind these words.
+    #[must_use]
+    pub fn has_looked(&self, look: &L) -> bool {
+        self.looked.contains(look)
+    }
+
     /// This look was taken.
     pub fn looked(&mut self, look: L) {
         self.looked.push(look);
