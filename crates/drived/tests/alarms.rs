@@ -6,12 +6,11 @@ mod support;
 use std::{
     fs,
     path::PathBuf,
-    thread,
     time::{Duration, Instant},
 };
 
 use serde_json::Value;
-use support::{File, Running, Sim, path, run};
+use support::{File, Running, Sim, look_again, path, run};
 
 /// How long something may take to come true.
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -74,7 +73,7 @@ impl Plant {
                 return alarm.clone();
             }
             assert!(Instant::now() < until, "{what}: {told}");
-            thread::yield_now();
+            look_again();
         }
     }
 
@@ -83,7 +82,7 @@ impl Plant {
         let file = self.state.join("alarms.json");
         while !fs::read_to_string(&file).is_ok_and(|kept| kept.contains(text)) {
             assert!(Instant::now() < until, "{text} is not kept");
-            thread::yield_now();
+            look_again();
         }
     }
 }

@@ -77,7 +77,7 @@ fn a_capture_of_a_port_ends_with_a_whole_file_whenever_it_ends() {
     says(&mut line, &[READ, STATUS, WRITE, WRITE]);
     line.write_all(&[1, 2, 3]).unwrap();
     while frames(&file) < 4 {
-        std::thread::yield_now();
+        support::look_again();
     }
     let (code, rest) = capture.interrupt();
     assert_eq!(code, Some(0), "{rest}");

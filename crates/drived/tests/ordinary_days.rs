@@ -216,7 +216,7 @@ fn a_daemon_puts_back_the_watchdog_that_one_before_it_had_armed_when_it_was_kill
     let mut daemon = Running::start(&["run", "--config", file.path()]);
     daemon.wait_for(r#""event":"watchdog_verified""#);
     while !std::fs::read_to_string(&kept).is_ok_and(|text| text.contains("north 1")) {
-        std::thread::yield_now();
+        support::look_again();
     }
     daemon.signal("-KILL");
     daemon.end();

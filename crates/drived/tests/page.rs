@@ -10,14 +10,10 @@ use std::{
     net::TcpListener,
     path::{Path, PathBuf},
     process::{Command, Stdio},
-    sync::{Mutex, PoisonError},
 };
 
 use drive_testing::peers;
-use support::{File, Running, Sim, ask, path, run};
-
-/// One browser at a time is enough for a machine with two processors: beside a second one the simulated drives answer too late.
-static ONE_BY_ONE: Mutex<()> = Mutex::new(());
+use support::{File, Running, Sim, ask, look_again, path, run};
 
 #[test]
 fn the_page_of_the_demo_loads_and_no_view_complains_in_the_console() {
@@ -294,13 +290,12 @@ fn look_with(
     told: impl FnOnce() -> Vec<String>,
     mut drives: Option<&mut Sim>,
 ) {
-    let _alone = ONE_BY_ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let port =
         TcpListener::bind("127.0.0.1:0").expect("a port is free").local_addr().expect("it has one").port();
     let address = format!("127.0.0.1:{port}");
     let _served = Running::start_unread(&[arguments, &["--http", &address]].concat());
     while std::net::TcpStream::connect(&address).is_err() {
-        std::thread::yield_now();
+        look_again();
     }
     // The system takes a connection before the program knows where its page is, of which it gives links.
     assert!(!ask(port, "GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").is_empty());

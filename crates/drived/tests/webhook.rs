@@ -11,12 +11,11 @@ use std::{
     os::unix::fs::PermissionsExt as _,
     path::PathBuf,
     process::Command,
-    thread,
     time::{Duration, Instant},
 };
 
 use serde_json::{Value, json};
-use support::{Running, Sim, free_port, get, path, python_with, run};
+use support::{Running, Sim, free_port, get, look_again, path, python_with, run};
 
 /// How long something may take to come true.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -117,7 +116,7 @@ fn receive(listener: &TcpListener, status: &str) -> Posted {
                     return posted;
                 }
             }
-            Err(error) if error.kind() == ErrorKind::WouldBlock => thread::yield_now(),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => look_again(),
             Err(error) => panic!("{error}"),
         }
         assert!(Instant::now() < until, "nothing is posted");
@@ -296,7 +295,7 @@ fn a_receiver_that_never_answers_holds_up_neither_another_nor_a_command_and_a_re
     let until = Instant::now() + PATIENCE;
     while !counted("drived_webhook_failed_attempts_total{receiver=\"silent\",reason=\"timeout\"} 1") {
         assert!(Instant::now() < until, "nothing is counted");
-        thread::yield_now();
+        look_again();
     }
     assert!(counted("drived_webhook_queue_messages{receiver=\"silent\"} 1"));
     assert!(counted("drived_webhook_queue_messages{receiver=\"well\"} 0"));

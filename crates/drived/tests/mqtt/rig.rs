@@ -12,7 +12,7 @@ use std::{
 
 use serde_json::{Value, json};
 
-use super::support::{File, Running, Sim, free_port, is_there, path};
+use super::support::{File, Running, Sim, free_port, is_there, look_again, path};
 
 /// Longer than anything here takes: what hangs fails.
 pub(crate) const PATIENCE_S: &str = "60";
@@ -59,7 +59,7 @@ impl Mosquitto {
     pub(crate) fn wait(&mut self) {
         while std::net::TcpStream::connect(("127.0.0.1", self.port)).is_err() {
             assert!(self.child.try_wait().expect("it can be waited for").is_none(), "mosquitto has ended");
-            std::thread::yield_now();
+            look_again();
         }
     }
 

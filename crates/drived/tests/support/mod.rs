@@ -9,6 +9,8 @@ use std::{
     path::PathBuf,
     process::{Child, ChildStdin, ChildStdout, Command, Output, Stdio},
     sync::atomic::{AtomicU32, Ordering},
+    thread,
+    time::Duration,
 };
 
 use drive_testing::peers;
@@ -81,6 +83,12 @@ pub(crate) fn run(arguments: &[&str]) -> Ended {
 /// A path of this test alone.
 pub(crate) fn path(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("drived-test-{}-{name}", std::process::id()))
+}
+
+/// Between two looks at what tells nobody that it has changed: it leaves the processor to what is waited for.
+#[expect(clippy::disallowed_methods, reason = "the tests have threads of their own")]
+pub(crate) fn look_again() {
+    thread::sleep(Duration::from_millis(5));
 }
 
 /// Sends the text of a request on a connection of its own, and gives what is answered.

@@ -62,7 +62,7 @@ impl Mosquitto {
             .stderr(Stdio::null())
             .spawn()?;
         while TcpStream::connect(("127.0.0.1", port)).is_err() {
-            thread::yield_now();
+            crate::support::look_again();
         }
         Ok(child)
     }

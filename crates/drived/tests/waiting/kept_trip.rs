@@ -1,15 +1,12 @@
 //! What the history has of a trip while its line was captured, by the command line. Over a pty, in real time; nothing here asserts a duration.
-#![cfg(unix)]
-
-mod support;
 
 use std::{
-    fs, thread,
+    fs,
     time::{Duration, Instant},
 };
 
+use crate::support::{File, Running, Sim, look_again, path, run};
 use serde_json::Value;
-use support::{File, Running, Sim, path, run};
 
 /// How long something may take to come true: what comes behind a trip is kept ten seconds at a time.
 const PATIENCE: Duration = Duration::from_secs(90);
@@ -34,7 +31,7 @@ fn a_trip_is_one_line_and_has_what_a_capture_of_its_line_has_heard() {
     let capture =
         Running::start(&["capture", "bench", "--to", captured, "--seconds", "600", "--socket", socket]);
     while fs::read(captured).map_or(0, |file| file.len()) < 1_000 {
-        thread::yield_now();
+        look_again();
     }
     sim.say("atv312@1 trip OCF", "done");
     daemon.wait_for(r#""event":"trip_explained""#);
@@ -49,7 +46,7 @@ fn a_trip_is_one_line_and_has_what_a_capture_of_its_line_has_heard() {
             break frames;
         }
         assert!(Instant::now() < until, "{}", told.out);
-        thread::yield_now();
+        look_again();
     };
     let told = run(&history);
     let trips: Vec<&str> = told.assert_done().lines().filter(|line| line.contains("tripped")).collect();

@@ -1,13 +1,9 @@
 //! `drived report` of the built program, looked at and printed by a headless Chromium over Playwright. Where they are not
 //! installed the tests print why they are skipped; where `CI` is set they fail instead, because `.ci/run` installs them.
 
-#![cfg(unix)]
-
-mod support;
-
 use std::{path::Path, process::Command};
 
-use support::{File, Running, Sim, path, run};
+use crate::support::{File, Running, Sim, path, run};
 
 #[test]
 fn the_report_of_a_line_needs_nothing_else_and_prints_on_as_many_pages_as_it_has_drives_and_some() {
@@ -71,8 +67,8 @@ fn the_report_of_the_daemon_has_its_drives_groups_and_lines_by_name_and_their_pa
 
 /// Looks at a report, and prints it.
 fn look(file: &Path, scene: &str) {
-    let Some(python) = support::python_with("playwright") else { return };
-    if !support::is_there("/usr/bin/chromium", &["--version"]) {
+    let Some(python) = crate::support::python_with("playwright") else { return };
+    if !crate::support::is_there("/usr/bin/chromium", &["--version"]) {
         return;
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/report.py");

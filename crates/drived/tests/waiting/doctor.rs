@@ -1,10 +1,7 @@
 //! `doctor` from outside, on the pty of a simulated line.
-#![cfg(unix)]
 
-mod support;
-
+use crate::support::{Running, Sim, path, run};
 use serde_json::Value;
-use support::{Running, Sim, path, run};
 
 #[test]
 fn a_healthy_line_is_0_and_a_missing_drive_is_1_with_a_report_that_names_it() {

@@ -2,17 +2,6 @@
 //! with a note, and reset; the API, the page in Chromium on a screen and on a phone, a reader of MQTT, Home Assistant itself, a host of
 //! Sparkplug, Prometheus with the rules of the program and the receiver of a webhook are asked at each step. `-- --nocapture` prints what
 //! each said.
-#![cfg(unix)]
-
-#[path = "mqtt/home.rs"]
-mod home;
-#[path = "support/page.rs"]
-mod page;
-#[path = "support/prometheus.rs"]
-mod prometheus;
-#[path = "mqtt/rig.rs"]
-mod rig;
-mod support;
 
 use std::{
     env,
@@ -22,16 +11,15 @@ use std::{
     net::{TcpListener, TcpStream},
     path::Path,
     process::{Child, ChildStdin, ChildStdout, Command, Stdio},
-    thread,
     time::{Duration, Instant},
 };
 
-use home::HomeAssistant;
-use page::Page;
-use prometheus::Prometheus;
-use rig::{Ear, Mosquitto};
+use crate::home::HomeAssistant;
+use crate::page::Page;
+use crate::prometheus::Prometheus;
+use crate::rig::{Ear, Mosquitto};
+use crate::support::{File, Running, Sim, free_port, get, is_there, look_again, path};
 use serde_json::{Value, json};
-use support::{File, Running, Sim, free_port, get, is_there, path};
 
 /// How long something may take to come true: a guard against waiting for ever.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -149,7 +137,7 @@ impl Receiver {
                         return told;
                     }
                 }
-                Err(error) if error.kind() == ErrorKind::WouldBlock => thread::yield_now(),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => look_again(),
                 Err(error) => panic!("{error}"),
             }
             assert!(Instant::now() < end, "nothing such is posted");
@@ -188,7 +176,7 @@ fn until<T: Debug>(mut say: impl FnMut() -> T, is_so: impl Fn(&T) -> bool) -> T 
             return said;
         }
         assert!(Instant::now() < end, "it says {said:?}");
-        thread::yield_now();
+        look_again();
     }
 }
 

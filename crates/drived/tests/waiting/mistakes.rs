@@ -1,12 +1,9 @@
 //! Mistakes of a tired person, fifty-five of them as somebody made them: each is understood, where nothing else can be meant, or is
 //! answered on one line that says what to type.
-#![cfg(unix)]
-
-mod support;
 
 use std::fs;
 
-use support::{Sim, path, run};
+use crate::support::{Sim, path, run};
 
 /// What becomes of a mistake.
 enum Ends {

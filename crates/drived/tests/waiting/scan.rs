@@ -1,13 +1,10 @@
 //! `scan --standstill` on a pty, of simulated drives with speeds and formats of their own.
-#![cfg(unix)]
 
-mod support;
-
+use crate::support::{path, run};
 use drive_sim::{
     Dialect, Model, SimLine, SimSlave,
     models::{atv28::Atv28, atv312::Atv312, drive_3g3ev::Drive3g3ev},
 };
-use support::{path, run};
 
 fn add(line: &SimLine, address: u8, settings: &str, model: Box<dyn Model>) -> SimSlave {
     let slave = line.add_boxed(address, model).expect("the address is free");

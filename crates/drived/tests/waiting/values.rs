@@ -1,15 +1,6 @@
 //! Every face beside what the drives themselves say: five families on one line, read through the gateway word by word and by the manuals, and
 //! as the API, the page in Chromium, `drived status`, MQTT, Home Assistant itself, a host of Sparkplug, Prometheus' text and the virtual unit
 //! tell them, with their ages; while drives are called otherwise, trip, are lost, leave and come back. `-- --nocapture` prints what each said.
-#![cfg(unix)]
-
-#[path = "mqtt/home.rs"]
-mod home;
-#[path = "support/page.rs"]
-mod page;
-#[path = "mqtt/rig.rs"]
-mod rig;
-mod support;
 
 use std::{
     collections::BTreeMap,
@@ -21,11 +12,11 @@ use std::{
     time::{Duration, Instant, SystemTime, UNIX_EPOCH},
 };
 
-use home::HomeAssistant;
-use page::Page;
-use rig::Mosquitto;
+use crate::home::HomeAssistant;
+use crate::page::Page;
+use crate::rig::Mosquitto;
+use crate::support::{Running, Sim, free_port, get, is_there, path, run};
 use serde_json::Value;
-use support::{Running, Sim, free_port, get, is_there, path, run};
 
 /// How long something may take to come true: a guard against waiting for ever.
 const PATIENCE: Duration = Duration::from_secs(120);

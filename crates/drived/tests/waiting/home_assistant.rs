@@ -2,20 +2,12 @@
 //! drive, a refusal, a restart of each side, a rename and a removal. `DRIVED_HOME_ASSISTANT_PYTHON` names the Python that has it; where that is
 //! not there the test says that it is skipped, and where `CI` is set it fails.
 
-#![cfg(unix)]
-
-#[path = "mqtt/home.rs"]
-mod home;
-#[path = "mqtt/rig.rs"]
-mod rig;
-mod support;
-
 use std::{fs, path::PathBuf};
 
-use home::HomeAssistant;
-use rig::{Daemon, Mosquitto};
+use crate::home::HomeAssistant;
+use crate::rig::{Daemon, Mosquitto};
+use crate::support::path;
 use serde_json::{Value, json};
-use support::path;
 
 /// A daemon on this broker that goes on where it was when it is started again; the heartbeat is the usual one, so that nothing here can
 /// be right by being told again.

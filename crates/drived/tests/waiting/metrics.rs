@@ -1,7 +1,4 @@
 //! `/metrics` of a real daemon with simulated drives of all families, read by programs that were not written here.
-#![cfg(unix)]
-
-mod support;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -10,10 +7,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use support::{File, Running, Sim, free_port, get, is_there, path, python_with, run};
+use crate::support::{File, Running, Sim, free_port, get, is_there, path, python_with, run};
 
 /// The table that a test in the crate holds against the code.
-const DOCUMENT: &str = include_str!("../METRICS.md");
+const DOCUMENT: &str = include_str!("../../METRICS.md");
 
 /// Five families on one line, the first tripped and the second without power.
 struct Plant {
@@ -158,8 +155,8 @@ fn programs_of_others_read_the_metrics_of_five_families() {
 
 #[test]
 fn every_alert_fires_where_it_should_and_nowhere_else() {
-    const RULES: &str = include_str!("../../drived-http/src/metrics/alerts.yml");
-    const TESTS: &str = include_str!("alerts.test.yml");
+    const RULES: &str = include_str!("../../../drived-http/src/metrics/alerts.yml");
+    const TESTS: &str = include_str!("../alerts.test.yml");
     let alerts: Vec<&str> = RULES.lines().filter_map(|line| line.trim().strip_prefix("- alert: ")).collect();
     assert!(alerts.len() > 10, "{alerts:?}");
     for alert in alerts {

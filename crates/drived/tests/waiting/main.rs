@@ -1,0 +1,28 @@
+//! What waits for most of its time: in one program, so that one waits beside another.
+
+#![cfg(unix)]
+
+mod alarm_life;
+mod doctor;
+mod end;
+#[path = "../mqtt/home.rs"]
+mod home;
+mod home_assistant;
+mod kept_trip;
+mod metrics;
+mod mistakes;
+#[path = "../support/page.rs"]
+mod page;
+#[cfg(target_os = "linux")]
+mod profile_faces;
+#[path = "../support/prometheus.rs"]
+mod prometheus;
+mod report;
+#[path = "../mqtt/rig.rs"]
+mod rig;
+mod scan;
+#[path = "../support/mod.rs"]
+mod support;
+#[path = "../support/terminal.rs"]
+mod terminal;
+mod values;
