@@ -158,8 +158,9 @@ settings! {
     /// how long a client that has started a motor may be silent, 1 s to a day
     client_timeout: Parsed<Time> = "for ever",
         |to, said| to.client_timeout = Some(within(said.0.0, SECOND..=DAY, "")?);
-    /// what happens then: `"report"`, an alarm among the events, or `"stop"`, a ramp stop. A client is watched on when the drive or
-    /// the gateway is called otherwise, when the gateway is gone, and by the next start where the run is taken up again after a kill
+    /// what happens then: `"report"`, an alarm among the events, or `"stop"`, a ramp stop. Not of a motor that somebody else has
+    /// started since by another door. A client is watched on when the drive or the gateway is called otherwise, when the gateway is
+    /// gone, and by the next start where the run is taken up again after a kill
     on_client_silence: Parsed<OnSilence> = "`\"report\"`", |to, said| to.stops_when_silent = said.0.0;
     /// what stands for a drive that does not answer: `"exception"` (0Bh), or `"silence"` for a SCADA that takes the whole gateway
     /// off-line for a 0Bh (Citect)

@@ -523,6 +523,33 @@ async fn the_silence_of_who_started_a_motor_stops_no_run_that_somebody_began_lon
     assert!(plant.machines[0].observe().running);
 }
 
+/// He has taken the motor over, whichever way it turns since, and is heard by nobody's time-out.
+#[tokio::test(start_paused = true)]
+async fn the_silence_of_who_started_a_motor_stops_none_that_somebody_else_has_started_again_since() {
+    for direction in [drive_core::Direction::Forward, drive_core::Direction::Reverse] {
+        let (plant, _desk, mut peer) = started_by_one_who_is_watched(true).await;
+        sleep(Duration::from_secs(3)).await;
+        peer.ask(1, &read(ETA, 1)).await;
+        let drive = plant.plant.fleet().drive("pump 1").unwrap().commanded_by("anna");
+        let begun = drive.start_at(direction, drive_core::Frequency::from_hertz(20)).await;
+        assert!(begun.is_confirmed(), "{begun}");
+        sleep(Duration::from_secs(30)).await;
+        assert!(plant.machines[0].observe().running, "{direction}");
+    }
+}
+
+/// What was refused has started nothing.
+#[tokio::test(start_paused = true)]
+async fn the_silence_of_who_started_a_motor_stops_it_behind_a_start_of_somebody_else_that_was_refused() {
+    let (plant, _desk, _peer) = started_by_one_who_is_watched(true).await;
+    let drive = plant.plant.fleet().drive("pump 1").unwrap().commanded_by("anna");
+    let refused =
+        drive.start_at(drive_core::Direction::Forward, drive_core::Frequency::from_hertz(400)).await;
+    assert!(!refused.is_confirmed(), "{refused}");
+    sleep(Duration::from_secs(30)).await;
+    assert!(!plant.machines[0].observe().running);
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_write_to_a_drive_that_does_not_answer_is_told_by_0b() {
     let (plant, desk) = operated(1, |_| {}).await;

@@ -119,6 +119,11 @@ impl Inner {
 
     /// Tells what happened to a drive. What came of a command that has been told as such is not told twice.
     pub(super) fn tell_event(&self, event: Event) {
+        if let EventKind::Command { command: Command::Start(_), commander, outcome, .. } = &event.kind
+            && outcome.is_confirmed()
+        {
+            self.watched.started_by(&event.place, commander);
+        }
         if !self.is_told_as_a_command(&event.kind) {
             let revision = self.revisions.push(Subject::Event, &event);
             self.recent

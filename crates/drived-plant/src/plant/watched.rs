@@ -215,6 +215,16 @@ impl Watched {
         }
     }
 
+    /// A start was confirmed. Whoever came by another door is not the one who has to be heard, and nobody else's silence is anything to
+    /// his run.
+    pub(super) fn started_by(&self, drive: &Place, commander: &str) {
+        let mut drives = self.lock();
+        if drives.get(drive).is_some_and(|watch| watch.starter.door != commander) {
+            drives.remove(drive);
+            self.change();
+        }
+    }
+
     /// The drive at a place is called otherwise.
     pub(super) fn call(&self, place: &Place, drive: &str) {
         if let Some(watch) = self.lock().get_mut(place) {
