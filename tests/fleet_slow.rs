@@ -5,7 +5,7 @@ use std::time::Duration;
 use drive_bus::Protocol;
 use drive_core::{Direction, Frequency, StopMode};
 use drive_families::Family;
-use drive_fleet::Periods;
+use drive_fleet::{Order, Periods, Until};
 use drive_sim::{Exception, Fault, SimSlave};
 use drive_testing::rig::Rig;
 use support::{
@@ -146,4 +146,37 @@ async fn one_late_answer_every_20_seconds_keeps_no_measurement_and_no_start_from
     }
     let late: u64 = slaves().values().map(|slave| slave.late).sum();
     assert!(late >= 20, "{late} late answers were heard");
+}
+
+/// README, promise 2: nothing of a command is sent behind the time that it says itself, however quickly each of its exchanges goes out. A
+/// drive that takes 60 ms for an answer is asked for longer than half a second before its motor turns.
+#[tokio::test(start_paused = true)]
+async fn no_run_word_goes_to_a_slow_drive_behind_the_time_that_its_start_has_said() {
+    for family in Family::BUILT_IN {
+        let plant = Plant::single(family, |settings| settings.watchdog = None);
+        let (drive, machine) = (plant.motor(), plant.machine());
+        drive.ready(BOUND).await.unwrap_or_else(|refused| panic!("{family}: {refused}"));
+        machine.set_turnaround(Some(60 * MS));
+        sleep(5_000 * MS).await;
+        let order = Order::Start {
+            direction: Direction::Forward,
+            setpoint: Some(Frequency::from_hertz(20).into()),
+            until: Until::InForce,
+        };
+        let begun = Instant::now();
+        let in_time = begun + 500 * MS;
+        let outcome = drive.order_until(order, in_time).await;
+        sleep(3_000 * MS).await;
+        let late: Vec<_> = machine
+            .received()
+            .into_iter()
+            .filter(|request| request.at > in_time && matches!(request.pdu.first(), Some(6 | 16)))
+            .map(|request| (request.at - begun, request.pdu))
+            .collect();
+        assert!(late.is_empty(), "{family}: {outcome}, {late:02X?}");
+        assert!(outcome.is_confirmed() == machine.observe().running, "{family}: {outcome}");
+        // Whoever says no time has it started: what is begun in its second has two more.
+        let outcome = drive.run(Direction::Forward, Frequency::from_hertz(20)).await;
+        assert!(outcome.is_confirmed(), "{family}: {outcome}");
+    }
 }

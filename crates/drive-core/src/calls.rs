@@ -44,6 +44,9 @@ pub struct Lifetimes {
     pub stop: Option<Duration>,
     /// Starts, setpoints, resets: 1 s by default, so that none is carried out late.
     pub command: Option<Duration>,
+    /// When nothing more of a command is sent, however quickly each call of it was: a drive that takes long to answer makes the next one
+    /// late. Never by default.
+    pub command_until: Option<Instant>,
     /// Keep-alives.
     pub keep_alive: Option<Duration>,
     /// Status polls; a daemon sets its poll period.
@@ -71,6 +74,7 @@ impl Default for Lifetimes {
         Self {
             stop: None,
             command: Some(Duration::from_secs(1)),
+            command_until: None,
             keep_alive: None,
             status: None,
             background: None,
@@ -170,7 +174,15 @@ impl<P: Port> Registers<P> {
     fn patience(&self, terms: Terms) -> Terms {
         let judges =
             terms.class == Class::Command && self.judged_until.is_some_and(|until| Instant::now() < until);
-        if judges { Terms { lifetime: None, ..terms } } else { terms }
+        if judges { Terms { lifetime: None, ..terms } } else { self.bounded(terms) }
+    }
+
+    /// A call that dies is sent in the time of its command, too.
+    fn bounded(&self, terms: Terms) -> Terms {
+        let until = self.lifetimes.command_until.filter(|_| terms.class == Class::Command);
+        let left = until.map(|until| until.saturating_duration_since(Instant::now()));
+        let lifetime = terms.lifetime.map(|lifetime| left.map_or(lifetime, |left| lifetime.min(left)));
+        Terms { lifetime, ..terms }
     }
 
     /// What is read from here on makes one picture of the drive, which is as old as its oldest answer.
@@ -492,7 +504,8 @@ impl<P: Port> Calls<'_, P> {
             request,
             Request::ReadCoils(..) | Request::ReadDiscreteInputs(..) | Request::ReadInputRegisters(..)
         );
-        let terms = if reads { self.registers.patience(self.terms) } else { self.terms };
+        let terms =
+            if reads { self.registers.patience(self.terms) } else { self.registers.bounded(self.terms) };
         self.request_under(terms, request, exchange).await
     }
 

@@ -13,7 +13,7 @@ use tokio::time::Instant;
 use crate::{
     runs::Keeper,
     settings::{DriveSettings, RunRecord},
-    supervisor::{Job, Question, Reply, Told},
+    supervisor::{Job, Lifetime, Question, Reply, Told},
 };
 
 /// How much is kept of what a panic says, in characters.
@@ -87,10 +87,9 @@ impl Driver {
         &mut self,
         keeper: &mut Keeper,
         job: Job,
-        lifetime: Option<Duration>,
+        mut lifetime: Lifetime,
         identity: Option<String>,
     ) -> (Reply, Option<Lease>) {
-        let mut lifetime = lifetime;
         if let Job::Start(direction) = job
             && let Some(word) = self.run_word_for(direction)
         {
@@ -98,7 +97,7 @@ impl Driver {
             let run = RunRecord::of(|| identity, Some(Lease::new(direction, word)), None);
             keeper.before(run).await;
             // The disk's time is the order's: a start is not sent late for it (rule 2).
-            lifetime = lifetime.map(|lifetime| lifetime.saturating_sub(began.elapsed()));
+            lifetime = lifetime.without(began.elapsed());
         }
         let reply = call(&mut *self.drive, job, lifetime).await;
         (reply, self.lease())
@@ -114,20 +113,23 @@ pub(crate) fn said(panic: &(dyn Any + Send)) -> String {
 
 /// How long what a job asks may wait until it is sent. The time of an order is that order's alone: what looks at a stop is in
 /// the class of commands, too, and waits for as long as it takes.
-fn lifetimes(job: Job, lifetime: Option<Duration>) -> Lifetimes {
-    let usual = Lifetimes::default();
+fn lifetimes(job: Job, lifetime: Lifetime) -> Lifetimes {
+    let (usual, Lifetime { call, all }) = (Lifetimes::default(), lifetime);
     match job {
-        Job::Status { .. } => Lifetimes { status: lifetime, ..usual },
-        Job::SetSetpoint(..) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
-            Lifetimes { command: lifetime, ..usual }
+        Job::Status { .. } => Lifetimes { status: call, ..usual },
+        Job::SetSetpoint(..) | Job::Start(_) => {
+            let command_until = all.map(|all| Instant::now() + all);
+            Lifetimes { command: call, command_until, ..usual }
         }
+        // Their steps belong together: what has risen is to fall again.
+        Job::ResetFaults | Job::Release | Job::Persist => Lifetimes { command: call, ..usual },
         Job::Stop(_) | Job::Withdraw => Lifetimes { command: None, ..usual },
         _ => usual,
     }
 }
 
 /// A call that goes on where it was cut, if it is such a one.
-async fn call(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Reply {
+async fn call(drive: &mut dyn Drive, job: Job, lifetime: Lifetime) -> Reply {
     if let Some(kept) = drive.kept_mut() {
         match (job.keeps(), job) {
             (Some(number), _) => kept.begin(number),
@@ -152,7 +154,7 @@ async fn given(drive: &mut dyn Drive, setpoint: Setpoint, start: Option<Directio
     drive.set_setpoint(setpoint).await
 }
 
-async fn asked(drive: &mut dyn Drive, job: Job, lifetime: Option<Duration>) -> Reply {
+async fn asked(drive: &mut dyn Drive, job: Job, lifetime: Lifetime) -> Reply {
     *drive.lifetimes_mut() = lifetimes(job, lifetime);
     match job {
         Job::Stop(mode) => Reply::stopped(drive.slave(), mode, drive.stop(mode).await),
@@ -198,16 +200,22 @@ mod tests {
 
     #[test]
     fn the_look_at_a_stop_has_all_the_time_whatever_was_left_to_the_order_before() {
-        let (short, usual) = (Some(Duration::from_millis(54)), Lifetimes::default());
+        const MS_54: Duration = Duration::from_millis(54);
+        let (time, usual) = (Some(MS_54), Lifetimes::default());
+        let short = Lifetime { call: time, all: time };
         let setpoint = Frequency::from_hertz(20).into();
-        let orders = [Job::SetSetpoint(setpoint, None), Job::ResetFaults, Job::Release, Job::Persist];
-        for order in [Job::Start(Direction::Forward)].into_iter().chain(orders) {
-            assert_eq!(lifetimes(order, short), Lifetimes { command: short, ..usual }, "{order:?}");
+        for order in [Job::SetSetpoint(setpoint, None), Job::Start(Direction::Forward)] {
+            let of_order = lifetimes(order, short);
+            assert_eq!(of_order.command, time, "{order:?}");
+            assert!(of_order.command_until.is_some_and(|until| until <= Instant::now() + MS_54), "{order:?}");
+        }
+        for order in [Job::ResetFaults, Job::Release, Job::Persist] {
+            assert_eq!(lifetimes(order, short), Lifetimes { command: time, ..usual }, "{order:?}");
         }
         for stop in [Job::Stop(StopMode::Ramp), Job::Withdraw] {
             assert_eq!(lifetimes(stop, short), Lifetimes { command: None, ..usual }, "{stop:?}");
         }
-        assert_eq!(lifetimes(Job::Status { anew: false }, short), Lifetimes { status: short, ..usual });
+        assert_eq!(lifetimes(Job::Status { anew: false }, short), Lifetimes { status: time, ..usual });
         assert_eq!(lifetimes(Job::KeepAlive, short), usual);
     }
 }

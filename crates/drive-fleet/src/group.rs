@@ -32,7 +32,7 @@ use crate::{
     round::Round,
     snapshot::{Link, Snapshot, has_reached},
     stop_order::{StopOrder, strength},
-    supervisor::Leave,
+    supervisor::{Expiry, Leave},
 };
 
 /// Mute drives that a stop of a line allows for at least.
@@ -409,7 +409,7 @@ impl Group {
                     return None;
                 }
                 // Its leave ends with any stop: its own time is that of a dialog on a line that has room for nothing more.
-                let expires = Instant::now() + 2 * member.settings().times.lifetime;
+                let expires = Expiry::since(Instant::now(), 2 * member.settings().times.lifetime);
                 let ticket = member.order_on(Some(leave), Some(expires), order);
                 told.give(member.name(), &ticket);
                 let outcome = ticket.unheard(false).await;

@@ -33,7 +33,7 @@ use crate::{
     settings::{DriveSettings, Left},
     snapshot::{Snapshot, WatchdogCheck},
     stop_order::StopOrder,
-    supervisor::{CallId, Leave, Question, Told},
+    supervisor::{CallId, Expiry, Leave, Question, Told},
     ticket::{StopTicket, Ticket},
 };
 
@@ -359,13 +359,19 @@ impl DriveHandle {
         self.order_on(None, None, order)
     }
 
-    /// Gives an order that is not sent after `expires`, whatever lifetime the settings give.
+    /// Gives an order of which nothing is sent after `expires`, whatever lifetime the settings give.
     pub fn order_until(&self, order: Order, expires: Instant) -> Ticket {
-        self.order_on(None, Some(expires), order)
+        self.order_on(None, Some(Expiry::at(expires)), order)
+    }
+
+    /// Gives an order that somebody gave then, with another lifetime than that of the settings: where nothing of it was sent by its end it
+    /// never is, and what a start has to write behind its first word follows within 2 s more.
+    pub fn order_since(&self, order: Order, given: Instant, lifetime: Duration) -> Ticket {
+        self.order_on(None, Some(Expiry::since(given, lifetime)), order)
     }
 
     /// Gives an order, and no more if a stop has come since its leave.
-    pub(crate) fn order_on(&self, leave: Option<Leave>, expires: Option<Instant>, order: Order) -> Ticket {
+    pub(crate) fn order_on(&self, leave: Option<Leave>, expires: Option<Expiry>, order: Order) -> Ticket {
         let (reply, hearer) = watch::channel(Progress::default());
         let (id, act) = (self.entry.new_call(), Arc::clone(&self.act));
         let hearer = match self.post(Message::Order { id, order, leave, expires, act, reply }) {

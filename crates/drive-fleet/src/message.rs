@@ -3,10 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use drive_core::{Direction, Setpoint};
-use tokio::{
-    sync::{oneshot, watch},
-    time::Instant,
-};
+use tokio::sync::{oneshot, watch};
 
 use crate::{
     cause::{Act, Policy},
@@ -16,7 +13,7 @@ use crate::{
     settings::DriveSettings,
     snapshot::Snapshot,
     stop_order::StopOrder,
-    supervisor::{CallId, Leave, Question, Told},
+    supervisor::{CallId, Expiry, Leave, Question, Told},
 };
 
 /// What waits its turn.
@@ -28,7 +25,7 @@ pub(crate) enum Message {
         order: Order,
         leave: Option<Leave>,
         /// When it may not be sent any more; `None`: as the settings say.
-        expires: Option<Instant>,
+        expires: Option<Expiry>,
         act: Arc<Act>,
         reply: Report,
     },

@@ -20,8 +20,14 @@ pub const NEVER_QUIET: &str = "the line is never quiet, something else is sendin
 /// Lets no request to a drive wait without end for a line that is never quiet.
 pub fn wait_at_most(drive: &mut dyn Drive) {
     let all = Some(QUIET_WITHIN);
-    *drive.lifetimes_mut() =
-        Lifetimes { stop: None, command: all, keep_alive: all, status: all, background: all };
+    *drive.lifetimes_mut() = Lifetimes {
+        stop: None,
+        command: all,
+        command_until: None,
+        keep_alive: all,
+        status: all,
+        background: all,
+    };
 }
 
 /// What a person reads when a drive did not do it.

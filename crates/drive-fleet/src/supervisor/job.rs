@@ -8,7 +8,10 @@ use drive_core::{
 };
 use tokio::time::Instant;
 
-use super::questions::{Question, Told};
+use super::{
+    expiry::Lifetime,
+    questions::{Question, Told},
+};
 
 /// What to do now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,7 +22,7 @@ pub(crate) enum Step {
         /// Whether it is done on the drive's turn.
         on_turn: bool,
         /// How long its calls may wait until they are sent.
-        lifetime: Option<Duration>,
+        lifetime: Lifetime,
         /// When to drop it, because something else must not wait for it.
         until: Option<Instant>,
     },

@@ -8,6 +8,7 @@
 mod adoption;
 pub(crate) mod checks;
 mod exit;
+mod expiry;
 mod job;
 mod line_lost;
 mod observe;
@@ -26,7 +27,6 @@ mod withdraw;
 use std::{
     collections::{BTreeMap, VecDeque},
     sync::Arc,
-    time::Duration,
 };
 
 use drive_core::{
@@ -46,6 +46,7 @@ use self::{
     withdraw::Withdrawal,
 };
 pub(crate) use self::{
+    expiry::{Expiry, Lifetime},
     job::{Job, Reply, Step, Turn},
     permission::Leave,
     questions::{Question, Told},
@@ -411,13 +412,15 @@ impl Supervisor {
         self.question_job().or_else(|| (self.pace.slow_due() <= now).then_some(Job::Measurements))
     }
 
-    fn lifetime(&self, now: Instant, job: Job) -> Option<Duration> {
+    fn lifetime(&self, now: Instant, job: Job) -> Lifetime {
         match job {
-            Job::Status { .. } => Some(self.pace.until_next(now, self.is_busy())),
-            Job::SetSetpoint(..) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
-                Some(self.order_lifetime(now))
+            Job::Status { .. } => {
+                Lifetime { call: Some(self.pace.until_next(now, self.is_busy())), all: None }
             }
-            _ => None,
+            Job::SetSetpoint(..) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
+                self.order_lifetime(now)
+            }
+            _ => Lifetime::default(),
         }
     }
 

@@ -1,11 +1,11 @@
 //! Orders: checked, sent once within their lifetime, and followed until the drive's own words show what became of them.
 
-use std::{collections::VecDeque, time::Duration};
+use std::collections::VecDeque;
 
 use drive_core::{Direction, Error, Setpoint, StopMode};
 use tokio::time::Instant;
 
-use super::{Asker, CallId, Job, Leave, Supervisor, permission::Blocked};
+use super::{Asker, CallId, Expiry, Job, Leave, Lifetime, Supervisor, permission::Blocked};
 use crate::{
     cause::{Cause, Policy},
     outcome::{Order, Outcome, Refused, Unconfirmed},
@@ -19,7 +19,7 @@ pub(super) struct Queued {
     /// The direction of the start that it prepares, of a group that has leave for one.
     before: Option<Direction>,
     /// When it may not be sent any more.
-    pub(super) expires: Instant,
+    pub(super) expires: Expiry,
 }
 
 /// The order that is being carried out.
@@ -30,7 +30,7 @@ pub(super) struct Active {
     /// The direction of the start that it prepares, of a group that has leave for one.
     pub(super) before: Option<Direction>,
     /// When its lifetime is over.
-    expires: Instant,
+    expiry: Expiry,
     /// The setpoint of a start, once it has been given.
     pub(super) setpoint_given: Option<Setpoint>,
     /// The watchdog was written on its behalf.
@@ -55,11 +55,16 @@ pub(super) enum Phase {
 impl Active {
     pub(super) fn wake_at(&self) -> Option<Instant> {
         match self.phase {
-            Phase::Prepare => Some(self.expires),
+            Phase::Prepare => Some(self.expires()),
             Phase::Sending(_) => None,
             Phase::Verifying { job: Job::SetSetpoint(..), until, again, .. } => Some(until.min(again)),
             Phase::Verifying { until, .. } | Phase::Awaiting { until, .. } => Some(until),
         }
+    }
+
+    /// When nothing more of it is sent.
+    const fn expires(&self) -> Instant {
+        self.expiry.of(self.setpoint_given.is_some())
     }
 
     pub(super) fn cause(&self) -> Cause {
@@ -84,7 +89,7 @@ impl Supervisor {
         asker: Asker,
         order: Order,
         leave: Option<Leave>,
-        expires: Option<Instant>,
+        expires: Option<Expiry>,
     ) -> bool {
         self.changed = true;
         if let Some(refused) = self.refuse_at_once(&asker, &order, leave) {
@@ -170,9 +175,9 @@ impl Supervisor {
         asker: Asker,
         order: Order,
         before: Option<Direction>,
-        expires: Option<Instant>,
+        expires: Option<Expiry>,
     ) {
-        let expires = expires.unwrap_or(now + self.settings.times.lifetime);
+        let expires = expires.unwrap_or(Expiry::since(now, self.settings.times.lifetime));
         self.queue.push_back(Queued { asker, order, before, expires });
     }
 
@@ -204,9 +209,9 @@ impl Supervisor {
     }
 
     /// How long the calls of the order in flight may wait.
-    pub(super) fn order_lifetime(&self, now: Instant) -> Duration {
-        let expires = self.active.as_ref().map_or(now, |active| active.expires);
-        expires.saturating_duration_since(now)
+    pub(super) fn order_lifetime(&self, now: Instant) -> Lifetime {
+        let left = |active: &Active| active.expiry.left(now, active.setpoint_given.is_some());
+        self.active.as_ref().map_or(Expiry::at(now).left(now, false), left)
     }
 
     /// The job that the orders want next, and how long it may take.
@@ -225,7 +230,7 @@ impl Supervisor {
                     asker,
                     order,
                     before,
-                    expires,
+                    expiry: expires,
                     setpoint_given: None,
                     armed: false,
                     blocked: None,
@@ -240,7 +245,7 @@ impl Supervisor {
                 }
                 Phase::Sending(_) | Phase::Verifying { .. } | Phase::Awaiting { .. } => return None,
             }
-            let (order, expires) = (active.order, active.expires);
+            let (order, expires) = (active.order, active.expires());
             if expires <= now {
                 let waited = active.blocked.is_some();
                 // What it has waited for may have come just now, and then something else is in the way, or nothing.

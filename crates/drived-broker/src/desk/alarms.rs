@@ -45,7 +45,8 @@ impl<A: Answers + Sync> Desk<A> {
         let judged = match doubt {
             Some(doubt) => Err(doubt),
             None => asked.map_err(Refusal::from).and_then(|asked| {
-                judge_time([sent_unix_ms, issued_unix_ms], arrived, LIFETIME, Duration::ZERO).map(|_| asked)
+                judge_time([sent_unix_ms, issued_unix_ms], arrived, LIFETIME.time(), Duration::ZERO)
+                    .map(|_| asked)
             }),
         };
         let order = match judged {

@@ -34,7 +34,7 @@ use drived_doors::{
 };
 use drived_plant::plant::{
     Plant,
-    commands::{Action, Asked, LIFETIME, LONGEST_LIFETIME, Request, Said, Target},
+    commands::{Action, Asked, LIFETIME, LONGEST_LIFETIME, Lifetime, Request, Said, Target},
     views::CommandView,
 };
 use drived_words::json::{milliseconds, unix};
@@ -76,7 +76,7 @@ pub struct Message<A> {
     /// When it was sent, by the clock of its sender.
     pub sent_unix_ms: Option<u64>,
     /// How long it may wait unless it says so itself, and at the longest in any case.
-    pub lifetime: Duration,
+    pub lifetime: Lifetime,
     pub longest: Option<Duration>,
     /// It may come again, so that it has to have a name.
     pub needs_id: bool,
@@ -177,15 +177,16 @@ impl<A: Answers + Sync> Desk<A> {
         let mut request = asked.of(target, message.arrived).map_err(Refusal::malformed)?;
         let longest = message.longest.map(|longest| longest.min(LONGEST_LIFETIME));
         request.lifetime = match (says_itself, longest) {
-            (true, Some(longest)) => request.lifetime.min(longest),
+            (true, Some(longest)) => Lifetime::Said(request.lifetime.time().min(longest)),
             (true, None) => request.lifetime,
-            (false, longest) => longest.unwrap_or(message.lifetime),
+            (false, Some(longest)) => Lifetime::Said(longest),
+            (false, None) => message.lifetime,
         };
         // Its time has run since it was sent; and the same command is the same again, whenever it comes.
         let age = judge_time(
             [message.sent_unix_ms, issued_unix_ms],
             message.arrived,
-            request.lifetime,
+            request.lifetime.time(),
             self.counter.clock_set_back(),
         )?;
         request.arrived = request.arrived.checked_sub(age).unwrap_or(request.arrived);

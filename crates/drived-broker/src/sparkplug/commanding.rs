@@ -4,8 +4,6 @@
 //! `Control/Command`, and what becomes of either stands in `Control/LastCommand/…`. The time of the payload says how old
 //! it is.
 
-use std::time::Duration;
-
 use drive_core::{Frequency, Setpoint, Speed};
 use drive_sparkplug::{Command, Value, Write, WriteError};
 use serde_json::{Value as Json, json};
@@ -22,7 +20,7 @@ use drived_doors::{Caller, Rights, Role, audit::Audit};
 use drived_plant::plant::{
     Plant,
     alarms::AlarmsSaid,
-    commands::{Action, Said, Target},
+    commands::{Action, Lifetime, Said, Target},
 };
 use drived_words::{json::unix, strict::Unclear};
 
@@ -35,7 +33,7 @@ pub(super) struct Commanding {
     plant: Plant,
     caller: Caller,
     /// How old a command may be that does not say so itself.
-    lifetime: Duration,
+    lifetime: Lifetime,
     /// What became of the last command of a drive, or of the last that was done with alarms.
     outcomes: mpsc::Sender<(Option<String>, Json)>,
 }
@@ -58,7 +56,7 @@ impl Commanding {
         let origin = format!("sparkplug {}", config.name.group);
         let caller = Caller::new(CALLER, origin, rights);
         let desk = Desk::open(plant.clone(), audit);
-        Self { desk, plant, caller, lifetime: config.lifetime, outcomes }
+        Self { desk, plant, caller, lifetime: Lifetime::Usual(config.lifetime), outcomes }
     }
 
     /// Takes what a host writes, one metric after the other. `is_alive`: the births have been told, so that the host can know

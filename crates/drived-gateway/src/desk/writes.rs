@@ -17,7 +17,7 @@ use drived_doors::{
     audit::{Kind, Record},
 };
 use drived_plant::plant::{
-    commands::{Action, Expects, LONGEST_LIFETIME, OutcomeWord, Rejected, Request, Target},
+    commands::{Action, Expects, LONGEST_LIFETIME, Lifetime, OutcomeWord, Rejected, Request, Target},
     revisions::Subject,
     watched::WatchedDoor,
 };
@@ -168,7 +168,7 @@ impl Desk {
             target: Target::Drive(drive.name().to_string()),
             action: Action::Stop(mode.into()),
             expects: Some(Expects::of(drive)),
-            lifetime: LONGEST_LIFETIME,
+            lifetime: Lifetime::Usual(LONGEST_LIFETIME),
             arrived,
         };
         self.record(caller, drive, &request).whenever();
@@ -438,7 +438,7 @@ impl Desk {
         deadline: Instant,
     ) -> Result<(), Refusal> {
         let left = || deadline.saturating_duration_since(Instant::now());
-        let lifetime = deadline.saturating_duration_since(arrived).min(LONGEST_LIFETIME);
+        let lifetime = Lifetime::Usual(deadline.saturating_duration_since(arrived).min(LONGEST_LIFETIME));
         let target = Target::Drive(drive.name().to_string());
         // While it waits for the audit log, the name may become another motor's.
         let expects = Some(Expects::of(drive));

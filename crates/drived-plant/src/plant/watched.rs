@@ -20,7 +20,7 @@ use tokio::{
 
 use super::{
     Plant,
-    commands::{Action, LONGEST_LIFETIME, Request, Target},
+    commands::{Action, LONGEST_LIFETIME, Lifetime, Request, Target},
     revisions::Subject,
 };
 use drived_config::{
@@ -372,7 +372,7 @@ impl Plant {
                     target,
                     action,
                     expects: None,
-                    lifetime: LONGEST_LIFETIME,
+                    lifetime: Lifetime::Usual(LONGEST_LIFETIME),
                     arrived: now,
                 };
                 // Nobody waits for it: the fleet repeats it until it is confirmed.

@@ -13,6 +13,8 @@ mod stops;
 mod undone;
 mod withdrawn;
 
+use std::time::Duration;
+
 use drive_core::{
     Command, Control, Direction, ExceptionMeaning, Exchange, Frequency, Identity, Lack, Lease, Measurements,
     Motion, PortError, Reaction, Recognised, Refusal, Result, SelfRestart, SlaveAddress, State, StopMode,

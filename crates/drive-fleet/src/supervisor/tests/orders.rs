@@ -72,7 +72,9 @@ fn given_behind_forty_hertz(runs: bool, answered_after: Duration) -> (Rig, CallI
         rig.pass(1_000 * MS);
     }
     rig.drive.log.clear();
-    let id = rig.order(run_at(10));
+    let (asker, expires) = (rig.asker(), Expiry::at(rig.now + 1_000 * MS));
+    rig.machine.handle_order(rig.now, asker, run_at(10), None, Some(expires));
+    let id = CallId(rig.next_call);
     let step = rig.machine.next(rig.now);
     let Step::Do { job: job @ Job::SetSetpoint(..), .. } = step else { panic!("{step:?}") };
     let reply = rig.drive.answer(job);
@@ -108,6 +110,24 @@ fn a_start_whose_time_is_over_behind_its_setpoint_tells_that_the_drive_has_that_
         let told = rig.outcome(id).map(ToString::to_string).unwrap_or_default();
         assert!(told.contains("its setpoint of 10.00 Hz is in the drive"), "{told}");
         assert_eq!(rig.snapshot().setpoint, Some(ten));
+    }
+}
+
+/// Nobody has said a time: what has begun within the lifetime of the settings has 2 s more, and no longer.
+#[test]
+fn a_start_that_has_begun_within_its_lifetime_goes_on_for_two_seconds_more_and_is_never_sent_behind_them() {
+    for (answered_after, is_sent) in [(1_500 * MS, true), (2_900 * MS, true), (3_001 * MS, false)] {
+        let mut rig = Rig::ready();
+        rig.machine.settings.periods.max_age = 10_000 * MS;
+        rig.drive.log.clear();
+        let id = rig.order(run_at(10));
+        let Step::Do { job: job @ Job::SetSetpoint(..), .. } = rig.machine.next(rig.now) else { panic!() };
+        let reply = rig.drive.answer(job);
+        rig.now += answered_after;
+        rig.machine.handle_reply(rig.now, reply);
+        rig.pass(3_000 * MS);
+        let was_sent = rig.drive.log.iter().any(|job| matches!(job, Job::Start(_)));
+        assert_eq!(was_sent, is_sent, "{answered_after:?}: {:?}", rig.outcome(id));
     }
 }
 

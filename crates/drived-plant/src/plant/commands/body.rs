@@ -9,7 +9,7 @@ use serde::{Deserialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
 use tokio::time::Instant;
 
-use super::{Action, Expects, LIFETIME, LONGEST_LIFETIME, Request, Target};
+use super::{Action, Expects, LIFETIME, LONGEST_LIFETIME, Lifetime, Request, Target};
 
 /// How long an id may be.
 const LONGEST_ID: usize = 64;
@@ -61,8 +61,8 @@ impl Asked {
         if id.as_ref().is_some_and(|id| !is_id(id)) {
             return Err(format!("id: expected 1 to {LONGEST_ID} printable ASCII characters without spaces"));
         }
-        let lifetime = expires_in_ms.map_or(LIFETIME, Duration::from_millis);
-        if lifetime.is_zero() || lifetime > LONGEST_LIFETIME {
+        let lifetime = expires_in_ms.map_or(LIFETIME, |time| Lifetime::Said(Duration::from_millis(time)));
+        if lifetime.time().is_zero() || lifetime.time() > LONGEST_LIFETIME {
             return Err(format!("expires_in_ms: expected 1 to {}", LONGEST_LIFETIME.as_millis()));
         }
         Ok(Request { id, target, action, expects, lifetime, arrived })

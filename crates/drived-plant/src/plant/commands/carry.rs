@@ -18,7 +18,7 @@ use tokio::{
 };
 
 use super::{
-    Action, ActionWord, OutcomeWord, Request, Target,
+    Action, ActionWord, Lifetime, OutcomeWord, Request, Target,
     log::Command,
     outcome::{GROUP_BUSY, GROUP_FAILED, GROUP_NOT_READY, of_all, told},
     settle::settled,
@@ -238,8 +238,13 @@ impl Work {
                 Posted::SetpointOfSeveral(group.set_setpoint(setpoint))
             }
             (action, _) => {
-                let expires = request.arrived + request.lifetime;
-                let order = |member: &DriveHandle| Some(member.order_until(order(action)?, expires));
+                let order = |member: &DriveHandle| {
+                    let order = order(action)?;
+                    Some(match request.lifetime {
+                        Lifetime::Usual(time) => member.order_since(order, request.arrived, time),
+                        Lifetime::Said(time) => member.order_until(order, request.arrived + time),
+                    })
+                };
                 Posted::Orders(group.members().iter().filter_map(order).collect())
             }
         }
@@ -263,7 +268,7 @@ impl Work {
             }
             Posted::Nothing => {
                 let Inner { plant, request, .. } = &*self.0;
-                let expires = request.arrived + request.lifetime;
+                let expires = request.arrived + request.lifetime.time();
                 let Ok(_turn) = timeout_at(expires, plant.0.group_starts.lock()).await else {
                     let text = "another start of a group was under way";
                     return self.end_all(OutcomeWord::Expired, GROUP_BUSY, text);

@@ -9,7 +9,7 @@ use std::{
 use drive_core::Setpoint;
 use tokio::{sync::watch, time::Instant};
 
-use super::{Action, Expects, OutcomeWord, Rejected, Request, Target};
+use super::{Action, Expects, Lifetime, OutcomeWord, Rejected, Request, Target};
 use crate::plant::views::CommandView;
 use drived_config::rights::Caller;
 
@@ -39,7 +39,7 @@ struct Entry {
     target: Target,
     action: Action,
     expects: Option<Expects>,
-    lifetime: Duration,
+    lifetime: Lifetime,
     command: Command,
 }
 

@@ -41,7 +41,7 @@ use super::{Plant, views::CommandView};
 use drived_config::{config::Group, rights::Caller};
 
 /// How long a command may wait until it is sent, unless it says so itself, and at the longest.
-pub const LIFETIME: Duration = Duration::from_secs(1);
+pub const LIFETIME: Lifetime = Lifetime::Usual(Duration::from_secs(1));
 pub const LONGEST_LIFETIME: Duration = Duration::from_secs(10);
 
 /// Of more drives than these what is told of a stop is made when they have theirs.
@@ -56,9 +56,27 @@ pub struct Request {
     pub action: Action,
     /// What whoever asks was shown; `None`: he means whoever is called so.
     pub expects: Option<Expects>,
-    pub lifetime: Duration,
+    pub lifetime: Lifetime,
     /// When it arrived.
     pub arrived: Instant,
+}
+
+/// How long a command may wait until it is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lifetime {
+    /// Nobody has said: until something of it is. A start that has begun goes on for as long as its drive takes, 2 s at the most.
+    Usual(Duration),
+    /// The command says it: whatever of it was not sent by then never is.
+    Said(Duration),
+}
+
+impl Lifetime {
+    #[must_use]
+    pub const fn time(self) -> Duration {
+        match self {
+            Self::Usual(time) | Self::Said(time) => time,
+        }
+    }
 }
 
 /// Who is meant.
@@ -596,7 +614,14 @@ mod tests {
             let caller = Caller::new("page", "page", Rights::ALL);
             let request = |name: &str, action, arrived| {
                 let (id, target) = (None, Target::Drive(name.to_owned()));
-                Request { id, target, action, expects: None, lifetime: LONGEST_LIFETIME, arrived }
+                Request {
+                    id,
+                    target,
+                    action,
+                    expects: None,
+                    lifetime: Lifetime::Usual(LONGEST_LIFETIME),
+                    arrived,
+                }
             };
             let setpoint = Some(Frequency::from_hertz(20).into());
             let (direction, until) = (Direction::Forward, Until::default());
