@@ -81,7 +81,7 @@ pub struct Start {
     /// The caller's name of the command: one that comes again within ten minutes is answered, and not repeated.
     #[schemars(length(min = 1, max = LONGEST_ID))]
     id: Option<String>,
-    /// After this time from its arrival it is not sent any more; 1000 unless it is said.
+    /// After this time from its arrival nothing of it is sent any more; unless it is said, it begins within 1000, and ends 2000 later.
     #[schemars(range(min = 1, max = 10_000))]
     expires_in_ms: Option<u64>,
     /// What was shown of the drives: it is carried out so, or refused.
