@@ -27,6 +27,7 @@ mod ladder;
 #[cfg(feature = "sim")]
 pub mod machine;
 mod profile;
+mod read_back;
 mod requests;
 mod scale;
 pub mod shipped;

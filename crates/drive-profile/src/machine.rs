@@ -171,16 +171,21 @@ impl Machine {
             }
             all.last() == Some(&written) && all.iter().all(|of| self.stands(&all, *of))
         };
+        // Of several coils that stop together each has to stand so.
+        let stops = |stop| {
+            let all = writes(stop);
+            all.contains(&written) && all.iter().all(|of| self.stands(&all, *of))
+        };
         if ends(&file.start.forward) {
             self.order = Some(Direction::Forward);
         } else if ends(&file.start.reverse) {
             self.order = Some(Direction::Reverse);
-        } else if writes(&file.stop.freewheel).contains(&written) {
+        } else if stops(&file.stop.freewheel) {
             self.order = None;
             self.motor.freewheel();
-        } else if writes(&file.stop.fast).contains(&written) {
+        } else if stops(&file.stop.fast) {
             (self.order, self.ramp) = (None, FAST);
-        } else if writes(&file.stop.ramp).contains(&written) {
+        } else if stops(&file.stop.ramp) {
             (self.order, self.ramp) = (None, RAMP);
         } else if writes(&file.reset).contains(&written) || self.has_reset_bit(written) {
             (self.order, self.fault) = (None, None);

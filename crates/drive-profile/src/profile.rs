@@ -5,6 +5,7 @@ use drive_core::Direction;
 use crate::{
     format::{Action, Answer, FedBy, File, Guard, Register, Sign, Space, Spanned, Step},
     ladder::{Gap, Level},
+    read_back::ReadBack,
 };
 
 /// A profile that was checked. What its file holds is whole: each name that it uses is one of its own.
@@ -182,8 +183,12 @@ impl File {
     }
 
     /// The word of a start that runs the motor. Of several words in its last step it is the one that [command] says, and of several of
-    /// these the one in the register that reads back: by it a drive tells this side's run command from another's.
+    /// these the one in the register that reads back: by it a drive tells this side's run command from another's. Where it reads back in
+    /// several it is what the whole start leaves there.
     pub(crate) fn run_word(&self, start: &Action, setpoint: Option<i32>) -> Option<u16> {
+        if let Some(split) = ReadBack::of(self).filter(ReadBack::is_split) {
+            return split.written(0, &self.writes(start));
+        }
         let written = self.written(start.steps.last()?.get_ref(), setpoint);
         let read_back = self.read_back();
         let mut runs = written.iter().filter(|written| self.runs(**written));

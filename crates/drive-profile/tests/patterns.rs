@@ -11,6 +11,7 @@ use drive_testing::{Contract, rig::Rig};
 use tokio::time::{Instant, sleep};
 
 const SIGNED: &str = include_str!("data/signed.toml");
+const DIRECTIONS: &str = include_str!("data/directions.toml");
 const SPLIT: &str = include_str!("data/split.toml");
 const ABB: &str = include_str!("data/abb.toml");
 
@@ -64,7 +65,7 @@ async fn written_while(rig: &mut Rig, register: u16, time: Duration) -> Vec<u16>
 
 /// Each pattern of control, with the profiles that have it, and how their drives are turned round where they do not say. Every profile that is
 /// shipped at motion is among them.
-const PATTERNS: [(&str, &str, Turned); 13] = [
+const PATTERNS: [(&str, &str, Turned); 14] = [
     ("code", "goodrive", Turned::Round),
     ("bits", "danfoss-fc", Turned::Round),
     ("bits", "vfs15", Turned::Round),
@@ -76,6 +77,7 @@ const PATTERNS: [(&str, &str, Turned); 13] = [
     ("ABB", "abb", Turned::NotKnown),
     ("coils", "wj200", Turned::Round),
     ("coils", "mx2", Turned::Round),
+    ("coils of directions", "directions", Turned::Round),
     ("split registers", "split", Turned::Round),
     ("setpoint is the command", "signed", Turned::Round),
 ];
@@ -128,6 +130,7 @@ async fn each_pattern_of_control_is_lived_through_each_act() {
         let profile = match key {
             "atv312" => profile(include_str!("../../../tests/profiles/atv312.toml")),
             "abb" => profile(ABB),
+            "directions" => profile(DIRECTIONS),
             "split" => profile(SPLIT),
             "signed" => profile(SIGNED),
             key => shipped::find(key).expect("it is shipped").clone(),
@@ -175,6 +178,46 @@ async fn each_pattern_of_control_is_lived_through_each_act() {
         rig.until_machine("it stands", |seen| !seen.running && seen.shaft_frequency == 0).await;
         println!("{pattern} ({key}): started, reversed ({turned:?}), stopped, tripped, reset, lost");
     }
+}
+
+/// Modbus Application Protocol V1.1b3, 6.11: both coils in one write, the first lowest. The command that reads back is both of them, so that
+/// a run command of somebody else is told from this side's, and a stop from both.
+#[tokio::test(start_paused = true)]
+async fn a_run_coil_for_each_direction_is_written_with_the_other_and_both_are_read_back() {
+    let profile = profile(DIRECTIONS);
+    assert_eq!(profile.level(), Level::Motion, "{:#?}", profile.gaps());
+    let mut rig = rig(profile);
+    rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await.expect("it takes it");
+    let coils_since = |rig: &Rig, since| -> Vec<Vec<u8>> {
+        let all = rig.machine.received_since(since).into_iter().map(|request| request.pdu.to_vec());
+        all.filter(|pdu| matches!(pdu[0], 0x05 | 0x0F)).collect()
+    };
+    let other = drive_core::registers::Place { space: drive_core::registers::Space::Coil, address: 2 };
+    for (direction, byte, output) in [(Direction::Forward, 0b01, 3_000), (Direction::Reverse, 0b10, -3_000)] {
+        sleep(Duration::from_millis(1)).await;
+        let began = Instant::now();
+        rig.drive.start(direction).await.unwrap_or_else(|error| panic!("{direction}: {error}"));
+        assert_eq!(coils_since(&rig, began), [vec![0x0F, 0, 1, 0, 2, 1, byte]], "{direction}");
+        rig.until_machine("its setpoint", |seen| seen.output_frequency == output).await;
+        let status = rig.drive.status().await.expect("it answers");
+        assert_eq!((status.direction, status.verdict), (Some(direction), Some(Verdict::InForce)));
+    }
+    sleep(Duration::from_millis(1)).await;
+    let began = Instant::now();
+    rig.drive.stop(StopMode::Ramp).await.expect("it stops");
+    assert_eq!(coils_since(&rig, began)[0], [0x0F, 0, 1, 0, 2, 1, 0]);
+    rig.until_machine("it stands", |seen| !seen.running && seen.shaft_frequency == 0).await;
+
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.machine.written_by_another_at(other, 1).expect("another master wants it in reverse");
+    rig.poll_for(Duration::from_secs(2)).await;
+    let status = rig.drive.status().await.expect("it answers");
+    assert_eq!(
+        rig.drive.lease(),
+        None,
+        "both coils are on: no run command of this side, {:?}",
+        status.verdict
+    );
 }
 
 /// Started, turned round, stopped, tripped, reset and lost. Its setpoint goes out with a start, and to a motor that runs by it; never else.

@@ -19,9 +19,28 @@ const CHECKER: [&str; 9] = [
 
 const SIGNED: &str = include_str!("data/signed.toml");
 const SPACES: &str = include_str!("data/spaces.toml");
+const DIRECTIONS: &str = include_str!("data/directions.toml");
 
 /// What a place of a good file becomes, and why that is refused. Those that want more than one place are in `refused.rs`.
 const SEEN: &[(&str, &str, &str, &str)] = &[
+    (
+        "directions",
+        "forward = { steps = [{ write = \"FORWARD\", coils = [true, false] }]",
+        "forward = { steps = [{ write = \"FORWARD\", coils = [true] }]",
+        "start.forward leaves the run command of the other start standing",
+    ),
+    (
+        "directions",
+        "what = \"run in reverse\"\naddress = 2\nspace = \"coil\"\naccess = \"read_write\"",
+        "what = \"run in reverse\"\naddress = 2\nspace = \"coil\"\naccess = \"write\"",
+        "a start runs by REVERSE and not by FORWARD, and REVERSE can only be written",
+    ),
+    (
+        "directions",
+        "{ write = \"RESET\", coils = [false] }, { write = \"FORWARD\", coils = [false, false] }]",
+        "{ write = \"REVERSE\", coils = [false, true] }]",
+        "the reset is left standing: it ends with 0001h",
+    ),
     ("v20", "format = 1\n", "format = 2\n", "format 2 is not read here"),
     ("v20", "key = \"v20\"", "key = \"V 20\"", "the key is the name in configurations"),
     ("v20", "functions = [3, 6, 16]", "functions = []", "no function is named"),
@@ -185,6 +204,7 @@ const SEEN: &[(&str, &str, &str, &str)] = &[
 fn base(name: &str) -> &'static str {
     match name {
         "spaces" => SPACES,
+        "directions" => DIRECTIONS,
         "signed" => SIGNED,
         name => {
             let ends = format!("/{name}");

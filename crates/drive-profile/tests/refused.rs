@@ -730,3 +730,26 @@ fn what_is_no_value_is_told_in_the_words_of_a_file() {
         );
     }
 }
+
+/// A register for each direction, as coils are elsewhere. By a byte of each a run command is told from another, and no more stands in a word.
+#[test]
+fn a_command_in_two_registers_that_hold_more_than_a_word_can_tell() {
+    let coils = include_str!("data/directions.toml");
+    let registers = |run: &str| {
+        let mut text = coils.replace("space = \"coil\"\n", "");
+        for (coils, words) in [
+            ("coils = [true, false]", format!("words = [{run}, 0]")),
+            ("coils = [false, true]", format!("words = [0, {run}]")),
+            ("coils = [false, false]", "words = [0, 0]".to_owned()),
+            ("coils = [true]", "words = [1]".to_owned()),
+            ("coils = [false]", "words = [0]".to_owned()),
+            ("mask = 1, value = 1,", format!("mask = 0xFFFF, value = {run},")),
+        ] {
+            text = text.replace(coils, &words);
+        }
+        text
+    };
+    assert_eq!(read(&registers("2")).map(|profile| profile.level()), Ok(Level::Motion));
+    let refusals = read(&registers("300")).expect_err("it does not stand in a byte");
+    assert!(refusals.to_string().contains("no run command is told from another"), "{refusals}");
+}

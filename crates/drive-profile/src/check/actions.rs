@@ -41,7 +41,10 @@ impl Check<'_> {
             self.steps(name, action);
             match name.split_once('.') {
                 Some(("stop", _)) => self.stop(name, action),
-                Some(_) => self.start(name, action),
+                Some(_) => {
+                    self.start(name, action);
+                    self.leaves_the_other_start(name, action);
+                }
                 None => self.runs_nothing(name, action),
             }
         }
@@ -292,13 +295,22 @@ impl Check<'_> {
                     format!("{name} writes {:04X}h, which holds a run bit", written.value),
                     format!("a word by which {name} starts nothing"),
                 );
-            } else if started(file).any(|run| run == written) {
-                self.refuse(
-                    &action.span(),
-                    format!("{name} writes {:04X}h, by which a start ends", written.value),
-                    "words that tell a start from a stop",
-                );
             }
+        }
+        let steps = action.get_ref().steps.iter().map(|step| file.written(step.get_ref(), None));
+        let steps: Vec<_> = steps.filter(|writes| !writes.iter().any(|of| file.runs(*of))).collect();
+        // One of several coils stands in a start as in a stop: what ends a start is all that its last step writes.
+        let ends_in = |writes: &Vec<Written>| {
+            let is_start = |run: &Vec<Written>| !run.is_empty() && run.iter().all(|of| writes.contains(of));
+            started(file).find(is_start)
+        };
+        if let Some(start) = steps.iter().find_map(ends_in) {
+            let words: Vec<_> = start.iter().map(|of| format!("{:04X}h", of.value)).collect();
+            self.refuse(
+                &action.span(),
+                format!("{name} writes {}, by which a start ends", words.join(", ")),
+                "words that tell a start from a stop",
+            );
         }
     }
 
@@ -441,7 +453,8 @@ impl Check<'_> {
     fn reset(&mut self, reset: &Spanned<Action>) {
         let file = self.file;
         let action = reset.get_ref();
-        let last = action.steps.iter().rev().find_map(|step| file.written(step.get_ref(), None).pop());
+        let last = action.steps.iter().rev().map(|step| file.written(step.get_ref(), None));
+        let last = last.into_iter().find(|writes| !writes.is_empty()).unwrap_or_default();
         let stops = |written: Written| {
             let stops = file.actions().filter(|(name, _)| name.starts_with("stop."));
             stops.flat_map(|(_, stop)| file.writes(stop.get_ref())).any(|stop| stop == written)
@@ -456,9 +469,9 @@ impl Check<'_> {
                 "clears_itself = true or false",
             ),
             // A stop that runs the motor is told of the stop.
-            Some(false) if !last.is_some_and(stops) && !wrong => self.refuse(
+            Some(false) if (last.is_empty() || !last.iter().all(|of| stops(*of))) && !wrong => self.refuse(
                 &reset.span(),
-                match last {
+                match last.into_iter().find(|of| !stops(*of)) {
                     Some(last) => format!(
                         "the reset is left standing: it ends with {:04X}h, which is no word of a stop, and some drives reset again and \
                          again, or restart",
@@ -485,8 +498,8 @@ impl Check<'_> {
     }
 }
 
-/// What starts end with.
-fn started(file: &File) -> impl Iterator<Item = Written> {
+/// What the last step of each start writes.
+fn started(file: &File) -> impl Iterator<Item = Vec<Written>> {
     let starts = file.actions().filter(|(name, _)| name.starts_with("start."));
-    starts.filter_map(|(_, start)| file.writes(start.get_ref()).pop())
+    starts.filter_map(|(_, start)| Some(file.written(start.get_ref().steps.last()?.get_ref(), None)))
 }

@@ -43,6 +43,26 @@ impl Check<'_> {
         );
     }
 
+    /// A drive of a run coil for each direction, or a register, whose other one a start leaves on: both on is a stop, or nobody knows what.
+    pub(super) fn leaves_the_other_start(&mut self, name: &str, start: &Spanned<Action>) {
+        let file = self.file;
+        let other = if name == "start.forward" { &file.start.reverse } else { &file.start.forward };
+        let is_level = file.command.given().is_some_and(|command| command.get_ref().acts != Acts::Edge);
+        let Some(other) = other.given().filter(|_| is_level) else { return };
+        let written = standing(&file.writes(start.get_ref()));
+        let runs = |((space, address), value)| file.runs(Written { space, address, value });
+        let left = standing(&file.writes(other.get_ref()));
+        if left.into_iter().any(|(place, value)| !written.contains_key(&place) && runs((place, value))) {
+            self.refuse(
+                &start.span(),
+                format!(
+                    "{name} leaves the run command of the other start standing, and says both directions then"
+                ),
+                "all of them in its last step, such as coils = [true, false]",
+            );
+        }
+    }
+
     /// The one bit of a stop stands in the word of one start and not in that of the other: a bit too many. Where the run command itself
     /// has it, as below operation enabled, or both starts do, it belongs there; so do the bits of a stop that takes one away.
     pub(super) fn stands_in_no_start(&mut self, name: &str, stop: &Spanned<Action>) {
@@ -50,7 +70,8 @@ impl Check<'_> {
         let (Some(forward), Some(reverse)) = (file.start.forward.given(), file.start.reverse.given()) else {
             return;
         };
-        let Some(&word) = file.writes(stop.get_ref()).first() else { return };
+        // Several coils or registers that stop together are no one bit.
+        let [word] = file.writes(stop.get_ref())[..] else { return };
         let holds = |start: &Spanned<Action>| {
             let left = standing(&file.writes(start.get_ref())).get(&(word.space, word.address)).copied();
             left.map(|left| (left, word.value.is_power_of_two() && left & word.value == word.value))

@@ -3,7 +3,10 @@
 use crate::format::Spanned;
 
 use super::Check;
-use crate::format::{Access, Answer, Bits, Guard, UnitName};
+use crate::{
+    format::{Access, Answer, Bits, Guard, Register, UnitName},
+    read_back::ReadBack,
+};
 
 impl Check<'_> {
     pub(super) fn who(&mut self) {
@@ -75,6 +78,33 @@ impl Check<'_> {
                 &name.span(),
                 format!("reads_back names {}, which has no run word of [command], or tells the state", name.get_ref()),
                 "the register of the run words, where it holds the command when it is read; else \"none\" or \"unknown\"",
+            );
+            return;
+        }
+        let Some(read_back) = ReadBack::of(file).filter(ReadBack::is_split) else { return };
+        let all = file.register.iter().map(|(name, register)| (name, register.get_ref()));
+        let cell =
+            |of: &(&String, &Register)| file.place(of.1).is_some_and(|at| read_back.cells().contains(&at));
+        let cells: Vec<_> = all.filter(cell).collect();
+        if let Some((other, _)) = cells.iter().find(|(_, of)| of.access == Access::Write) {
+            self.refuse(
+                &name.span(),
+                format!(
+                    "a start runs by {other} and not by {}, and {other} can only be written",
+                    name.get_ref()
+                ),
+                format!("access = \"read_write\" where {other} reads back; else reads_back = \"none\""),
+            );
+        }
+        let most = read_back.most();
+        let mut written = file.actions().flat_map(|(_, action)| file.writes(action.get_ref()));
+        if written
+            .any(|of| read_back.cells().contains(&(of.space, of.address)) && of.value >= most && most > 1)
+        {
+            self.refuse(
+                &name.span(),
+                format!("the command stands in {} registers, and by {most:04X}h and more in one of them no run command is told from another", cells.len()),
+                "reads_back = \"unknown\"",
             );
         }
     }

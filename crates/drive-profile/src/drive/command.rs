@@ -437,10 +437,10 @@ impl<P: Port> ProfileDrive<P> {
 
     /// What is about to be written. A command word is what reads back as one: a word for another register says nothing of it.
     fn sends(&mut self, writes: &[Written]) {
-        let read_back = self.profile.file().read_back();
-        let command = writes.iter().find(|written| Some((written.space, written.address)) == read_back);
+        let held = self.watch.run.held().unwrap_or(0);
+        let command = self.sight.reads_back.as_ref().and_then(|of| of.written(held, writes));
         if let Some(command) = command {
-            self.watch.run.sends(command.value);
+            self.watch.run.sends(command);
         }
     }
 

@@ -8,6 +8,7 @@ use super::cell::{Cell, Single};
 use crate::{
     format::{Access, Answer, Bits, Register, Space, UnitName},
     profile::Profile,
+    read_back::ReadBack,
 };
 
 /// Registers that one exchange reads.
@@ -91,14 +92,11 @@ impl Profile {
         names.extend(owners.map(|owner| name(&owner.get_ref().bits.register)));
         let mut blocks = self.blocks(&names);
         // Read along where it costs no exchange; else the command in its turn, and the code once there is a fault.
-        let reads_back = file.ownership.reads_back.given().map(|read| name(&read.get_ref().register));
-        for also in [reads_back, given(&file.faults.present)].into_iter().flatten() {
-            names.insert(also);
-            let with = self.blocks(&names);
+        for also in [self.reads_back(), given(&file.faults.present).into_iter().collect()] {
+            let all: BTreeSet<&str> = names.iter().copied().chain(also).collect();
+            let with = self.blocks(&all);
             if with.len() == blocks.len() {
-                blocks = with;
-            } else {
-                names.remove(also);
+                (names, blocks) = (all, with);
             }
         }
         blocks
@@ -106,23 +104,35 @@ impl Profile {
 
     /// What reads the code of the present fault, where a status does not.
     pub(crate) fn code(&self) -> Option<Block> {
-        self.apart(given(&self.file.faults.present)?)
+        self.apart(given(&self.file.faults.present).into_iter().collect()).first().copied()
     }
 
     /// What reads the command back, where a status does not.
-    pub(crate) fn command(&self) -> Option<Block> {
-        self.apart(name(&self.file.ownership.reads_back.given()?.get_ref().register))
+    pub(crate) fn command(&self) -> Vec<Block> {
+        self.apart(self.reads_back())
     }
 
-    /// What reads a register that no status reads.
-    fn apart(&self, name: &str) -> Option<Block> {
-        let (_, space, address) = self.place_of(name)?;
-        let holds = |block: &Block| {
-            let at = address.checked_sub(block.first);
-            block.space == space && at.is_some_and(|at| at < block.count)
+    /// The registers in which the command reads back.
+    fn reads_back(&self) -> BTreeSet<&str> {
+        let Some(read_back) = ReadBack::of(&self.file) else { return BTreeSet::new() };
+        let is_its = |register: &Register| {
+            self.file.place(register).is_some_and(|place| read_back.cells().contains(&place))
         };
-        let block = Block { space, first: address, count: 1 };
-        (!self.fast().iter().any(holds)).then_some(block)
+        let all = self.file.register.iter().filter(|(_, register)| is_its(register.get_ref()));
+        all.map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// What reads registers that no status reads.
+    fn apart(&self, names: BTreeSet<&str>) -> Vec<Block> {
+        let fast = self.fast();
+        let is_read = |name: &&str| {
+            let holds = |(_, space, address): (&Register, Space, u16)| {
+                let at = |block: &Block| address.checked_sub(block.first).filter(|_| block.space == space);
+                fast.iter().any(|block| at(block).is_some_and(|at| at < block.count))
+            };
+            self.place_of(name).is_none_or(holds)
+        };
+        self.blocks(&names.into_iter().filter(|name| !is_read(name)).collect())
     }
 
     /// The register that a write by function 23 reads along: the first that tells the state.

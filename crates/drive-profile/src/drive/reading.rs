@@ -55,9 +55,11 @@ impl<P: Port> ProfileDrive<P> {
     pub(super) async fn read_status(&mut self, class: Class) -> Result<(Status, Words)> {
         let sight = self.sight.clone();
         let mut words = self.read_blocks(class, &sight.fast).await?;
-        if let Some(block) = sight.command.filter(|_| self.wants_command(class)) {
-            let read = self.read_block(class, block).await.inspect_err(|_| self.watch.turns.again())?;
-            words.keep(block, read);
+        if !sight.command.is_empty() && self.wants_command(class) {
+            for block in &sight.command {
+                let read = self.read_block(class, *block).await.inspect_err(|_| self.watch.turns.again())?;
+                words.keep(*block, read);
+            }
         }
         let mut status = self.explain(&words);
         if let Some(block) = sight.code.filter(|_| status.is_fault()) {
@@ -282,13 +284,7 @@ impl<P: Port> ProfileDrive<P> {
 
     /// Whether a word of the command register that reads back runs the motor.
     pub(super) fn is_run(&self, word: u16) -> bool {
-        let file = self.profile.file();
-        let register =
-            file.ownership.reads_back.given().and_then(|read| file.named(read.get_ref().register.get_ref()));
-        let place = register.and_then(|register| file.place(register));
-        place.is_some_and(|(space, address)| {
-            file.runs(crate::profile::Written { space, address, value: word })
-        })
+        self.sight.reads_back.as_ref().is_some_and(|of| of.runs(self.profile.file(), word))
     }
 
     pub(super) async fn read_measurements(&mut self) -> Result<Measurements> {

@@ -6,6 +6,7 @@ use super::{Words, cell::Cell, plan::Block};
 use crate::{
     format::{Answer, Bits, Direction as Turns, Owner, Proves, Spanned},
     profile::Profile,
+    read_back::ReadBack,
 };
 
 /// What is read of a drive, and where its values stand in that.
@@ -18,7 +19,7 @@ pub(super) struct Sight {
     /// What reads the code of the present fault, where no status does.
     pub(super) code: Option<Block>,
     /// What reads the command back, where no status does.
-    pub(super) command: Option<Block>,
+    pub(super) command: Vec<Block>,
     /// The states, the first that fits.
     pub(super) states: Vec<(State, Test)>,
     pub(super) standstill: Option<Test>,
@@ -36,8 +37,8 @@ pub(super) struct Sight {
     pub(super) dc_bus_voltage: Option<Cell>,
     /// The code of the present fault.
     pub(super) fault: Option<Cell>,
-    /// The command word that reads back.
-    pub(super) reads_back: Option<Cell>,
+    /// The command that reads back.
+    pub(super) reads_back: Option<ReadBack>,
     pub(super) full_scale: Option<FullScale>,
     direction: Option<(Cell, Turns)>,
 }
@@ -101,10 +102,7 @@ impl Sight {
             output_voltage: cell(&see.output_voltage),
             dc_bus_voltage: cell(&see.dc_bus_voltage),
             fault: cell(&file.faults.present),
-            reads_back: owner
-                .reads_back
-                .given()
-                .and_then(|read| profile.cell(read.get_ref().register.get_ref())),
+            reads_back: ReadBack::of(file),
             full_scale: full_scale.and_then(|full| match full.get_ref().as_str() {
                 "owner" => Some(FullScale::Owner),
                 name => profile.cell(name).map(FullScale::Register),
@@ -147,7 +145,7 @@ impl Sight {
 
     /// The command that the drive is read to hold.
     pub(super) fn held(&self, words: &Words) -> Option<u16> {
-        self.reads_back?.word(words)
+        self.reads_back.as_ref()?.word(|space, address| words.at(space, address))
     }
 
     /// The code of the present fault.

@@ -52,7 +52,7 @@ impl Profile {
         let (fast, slow) = (self.fast(), self.slow());
         let unit = self.setpoint_unit();
         let status_exchanges = u8::try_from(fast.len()).unwrap_or(u8::MAX);
-        let command_exchanges = u8::from(self.command().is_some());
+        let command_exchanges = u8::try_from(self.command().len()).unwrap_or(u8::MAX);
         interned::one(Capabilities {
             functions: interned::list(&functions),
             read_words: link.read_words.given().copied().unwrap_or(1),
