@@ -166,6 +166,21 @@ impl<'a> Ladder<'a> {
         let parts = std::iter::successors(Some(0_u16), |part| {
             Some((part | !all).wrapping_add(1) & all).filter(|next| *next != 0)
         });
+        let is_ready = |is: &&Spanned<StateIs>| is.get_ref().bits.get_ref().fit(0);
+        let zero = self.file.state.is.iter().find(is_ready).map(|is| is.get_ref().state);
+        let who = &self.file.who;
+        let guards = [&who.fingerprints, &who.guards].into_iter().filter_map(Answer::given).flatten();
+        let is_alive = |guard: &Spanned<Guard>| {
+            let (is, is_not) = (&guard.get_ref().is, &guard.get_ref().is_not);
+            is.as_ref().is_some_and(|is| !is.contains(&0))
+                || is_not.as_ref().is_some_and(|not| not.contains(&0))
+        };
+        if zero == Some(StateName::Ready) && !guards.into_iter().any(is_alive) {
+            self.say(
+                "a status of 0000h is told as ready, and nothing tells it from one of a drive that has no supply or that answers 0 to whatever is asked",
+                "which register is never 0 while it is alive? As a guard, it is read before each start",
+            );
+        }
         let none_fits = |word: &u16| !states().any(|bits| bits.fit(*word));
         if let Some(word) = parts.into_iter().find(none_fits) {
             self.say(

@@ -214,24 +214,9 @@ impl Machine {
 
     /// Whether a word of a command of bits has the bit that rises in a reset, whatever else it has: a direction, say.
     fn has_reset_bit(&self, written: Written) -> bool {
-        let file = self.profile.file();
-        let Some(reset) = file.reset.given().map(crate::format::Spanned::get_ref) else { return false };
-        let at_place = |of: &Written| (of.space, of.address) == (written.space, written.address);
-        let steps = reset.steps.iter().map(|step| file.written(step.get_ref(), None));
-        let words: Vec<Vec<Written>> = steps.collect();
-        let left = words.iter().flatten().rev().find(|of| at_place(of));
-        let rising = words.get(file.rising(reset)).into_iter().flatten().find(|of| at_place(of));
-        let (Some(rising), Some(left)) = (rising, left) else { return false };
-        let of_bits = file.command.given().is_some_and(|command| {
-            let mut runs = command.get_ref().runs.iter().map(crate::format::Spanned::get_ref).filter(|run| {
-                let register = file.named(run.register.get_ref());
-                register.and_then(|register| file.place(register)) == Some((written.space, written.address))
-            });
-            runs.next().is_some_and(|run| run.mask.get_ref() != &u16::MAX)
-                && runs.all(|run| run.mask.get_ref() != &u16::MAX)
-        });
-        let bits = rising.value & !left.value;
-        of_bits && bits != 0 && written.value & bits == bits
+        let rises = self.profile.file().reset_bits();
+        let at_place = |of: &&Written| (of.space, of.address) == (written.space, written.address);
+        rises.iter().find(at_place).is_some_and(|rise| written.value & rise.value == rise.value)
     }
 
     /// Whether a word takes the place of the run word that stands, and is none.

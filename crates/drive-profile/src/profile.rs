@@ -3,7 +3,7 @@
 use drive_core::Direction;
 
 use crate::{
-    format::{Action, Answer, FedBy, File, Guard, Register, Sign, Space, Spanned, Step},
+    format::{Action, Answer, Bits, FedBy, File, Guard, Register, Sign, Space, Spanned, Step},
     ladder::{Gap, Level},
     read_back::ReadBack,
 };
@@ -213,6 +213,40 @@ impl File {
         steps.iter().rposition(rises).filter(|_| !clears_itself).or(last).unwrap_or(0)
     }
 
+    /// The bits by which the reset resets: what rises in it, at each place of a command of bits, and at each coil.
+    pub(crate) fn reset_bits(&self) -> Vec<Written> {
+        let Some(reset) = self.reset.given().map(Spanned::get_ref) else { return Vec::new() };
+        let steps: Vec<_> = reset.steps.iter().map(|step| self.written(step.get_ref(), None)).collect();
+        let rising = steps.get(self.rising(reset)).into_iter().flatten();
+        let bits = rising.filter(|rising| rising.space.is_bit() || self.is_of_bits(**rising)).map(|rising| {
+            let at_place = |of: &&Written| (of.space, of.address) == (rising.space, rising.address);
+            let left = steps.iter().flatten().rev().find(at_place).map_or(0, |left| left.value);
+            Written { value: rising.value & !left, ..*rising }
+        });
+        bits.filter(|rising| rising.value != 0).collect()
+    }
+
+    /// Whether single bits of what is written there command the motor. Of a code the whole word does.
+    fn is_of_bits(&self, written: Written) -> bool {
+        let mut runs = self.runs_at(written).peekable();
+        runs.peek().is_some() && runs.all(|run| *run.mask.get_ref() != u16::MAX)
+    }
+
+    /// The forms of a run command at the place of a word.
+    fn runs_at(&self, written: Written) -> impl Iterator<Item = &Bits> {
+        let runs = self.command.given().into_iter().flat_map(|command| &command.get_ref().runs);
+        runs.map(Spanned::get_ref).filter(move |run| {
+            let place = self.named(run.register.get_ref()).and_then(|register| self.place(register));
+            place == Some((written.space, written.address))
+        })
+    }
+
+    /// The bits of a word that [command] wants on for the run command that it is.
+    pub(crate) fn needed_to_run(&self, written: Written) -> u16 {
+        let its = self.runs_at(written).filter(|run| !run.differs && run.fit(written.value));
+        its.fold(0, |all, run| all | run.mask.get_ref() & run.value)
+    }
+
     /// Where the command reads back.
     pub(crate) fn read_back(&self) -> Option<(Space, u16)> {
         let read = self.ownership.reads_back.given()?;
@@ -248,12 +282,7 @@ impl File {
 
     /// Whether a word that is written runs the motor.
     pub(crate) fn runs(&self, written: Written) -> bool {
-        let Some(command) = self.command.given() else { return false };
-        command.get_ref().runs.iter().any(|run| {
-            let run = run.get_ref();
-            let place = self.named(run.register.get_ref()).and_then(|register| self.place(register));
-            place == Some((written.space, written.address)) && run.fit(written.value)
-        })
+        self.runs_at(written).any(|run| run.fit(written.value))
     }
 }
 

@@ -5,12 +5,13 @@ use std::fmt::Write as _;
 use drive_profile::{read, shipped};
 
 /// The sources of the checker.
-const CHECKER: [&str; 9] = [
+const CHECKER: [&str; 10] = [
     include_str!("../src/check/mod.rs"),
     include_str!("../src/check/who.rs"),
     include_str!("../src/check/fingerprints.rs"),
     include_str!("../src/check/registers.rs"),
     include_str!("../src/check/states.rs"),
+    include_str!("../src/check/running.rs"),
     include_str!("../src/check/actions.rs"),
     include_str!("../src/check/standing.rs"),
     include_str!("../src/check/seen.rs"),
@@ -23,6 +24,48 @@ const DIRECTIONS: &str = include_str!("data/directions.toml");
 
 /// What a place of a good file becomes, and why that is refused. Those that want more than one place are in `refused.rs`.
 const SEEN: &[(&str, &str, &str, &str)] = &[
+    (
+        "directions",
+        "{ register = \"STATUS\", mask = 0x0004, value = 0x0004, source = \"made\" }",
+        "{ register = \"STATUS\", mask = 0x0001, value = 0x0001, source = \"made\" }",
+        "at_setpoint is told of every motor that runs",
+    ),
+    (
+        "directions",
+        "command = { bits = { register = \"STATUS\", mask = 0x0200, value = 0x0200,",
+        "command = { bits = { register = \"STATUS\", mask = 0x0001, value = 0x0001,",
+        "is told to be the bus's by the bits that show that the motor runs",
+    ),
+    (
+        "directions",
+        "mask = 0x0002, forward = 0x0000, reverse = 0x0002,",
+        "mask = 0x0001, forward = 0x0001, reverse = 0x0000,",
+        "which way it turns is told by bits that are 0001h in every motor that runs",
+    ),
+    (
+        "directions",
+        "    { state = \"running\", ",
+        "    { state = \"ready\", bits = { register = \"STATUS\", mask = 0x0010, value = 0x0010, source = \"made\" } },\n    { state = \"running\", ",
+        "a motor that runs may be told as \"ready\", which stands before it",
+    ),
+    (
+        "directions",
+        "forward = { steps = [",
+        "forward = { steps = [{ await = { register = \"STATUS\", mask = 1, value = 1, source = \"made\" }, within_ms = 1000 }, ",
+        "start.forward waits for a motor that runs before it writes the run command",
+    ),
+    (
+        "goodrive",
+        "forward = { steps = [",
+        "forward = { steps = [{ await = { register = \"STATE\", mask = 0xFFFF, value = 1, source = \"manuals\" }, within_ms = 1000 }, ",
+        "start.forward waits for a motor that runs before it writes the run command",
+    ),
+    (
+        "vfs15",
+        "forward = { steps = [{ write = \"FA00\", words = [0xC400] }]",
+        "forward = { steps = [{ write = \"FA00\", words = [0xE400] }]",
+        "start.forward writes E400h, which holds the bit by which the reset resets (2000h)",
+    ),
     (
         "directions",
         "forward = { steps = [{ write = \"FORWARD\", coils = [true, false] }]",

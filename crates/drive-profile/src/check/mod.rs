@@ -3,6 +3,7 @@
 mod actions;
 mod fingerprints;
 mod registers;
+mod running;
 mod seen;
 mod setpoint;
 mod standing;
@@ -127,6 +128,7 @@ impl<'a> Check<'a> {
         }
         self.who();
         self.states();
+        self.running();
         self.actions();
         self.setpoint();
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Check;
 use crate::{
-    format::{Action, Acts, Bits, Space, Spanned},
+    format::{Action, Acts, Space, Spanned},
     profile::Written,
 };
 
@@ -81,13 +81,7 @@ impl Check<'_> {
             (Some((_, false)), Some(it @ (_, true))) => ("start.reverse", reverse, it),
             _ => return,
         };
-        let runs = file.command.given().into_iter().flat_map(|command| &command.get_ref().runs);
-        let its = |bits: &&Spanned<Bits>| {
-            let place = file.named(bits.get_ref().register.get_ref()).and_then(|of| file.place(of));
-            place == Some((word.space, word.address)) && !bits.get_ref().differs && bits.get_ref().fit(left)
-        };
-        let needed =
-            runs.filter(its).fold(0, |all, bits| all | bits.get_ref().mask.get_ref() & bits.get_ref().value);
+        let needed = file.needed_to_run(Written { value: left, ..word });
         if word.value & !needed != 0 {
             self.refuse(
                 &spanned.span(),

@@ -1,23 +1,8 @@
 //! States: none that covers another, none that hides a trip, and none that nobody can leave.
 
 use super::Check;
-use crate::format::{Access, Answer, Bits, Deed, Register, Space, Spanned, StateIs, StateName};
+use crate::format::{Access, Answer, Deed, Register, Space, Spanned, StateIs, StateName};
 use crate::ladder::word;
-
-/// Whether a word can fit both.
-fn overlap(one: &StateIs, other: &StateIs) -> bool {
-    let (one, other) = (one.bits.get_ref(), other.bits.get_ref());
-    one.register.get_ref() == other.register.get_ref()
-        && !is_contrary(one, other)
-        && (one.differs
-            || other.differs
-            || (one.value ^ other.value) & one.mask.get_ref() & other.mask.get_ref() == 0)
-}
-
-/// Whether one says what the other denies.
-fn is_contrary(one: &Bits, other: &Bits) -> bool {
-    one.differs != other.differs && one.mask.get_ref() == other.mask.get_ref() && one.value == other.value
-}
 
 /// Whether every word that fits the second fits the first.
 fn covers(first: &StateIs, second: &StateIs) -> bool {
@@ -25,8 +10,23 @@ fn covers(first: &StateIs, second: &StateIs) -> bool {
     let plain = !first.bits.get_ref().differs || first.bits.get_ref().value == second.bits.get_ref().value;
     alike
         && plain
-        && overlap(first, second)
+        && meets(first, second)
         && first.bits.get_ref().mask.get_ref() & !second.bits.get_ref().mask.get_ref() == 0
+}
+
+fn meets(one: &StateIs, other: &StateIs) -> bool {
+    one.bits.get_ref().meet(other.bits.get_ref())
+}
+
+/// Whether a state of a motor that stands takes words of one that runs without a look at the bits that show it. A state that looks at all
+/// of them and more is a narrower one.
+fn hides_running(before: &StateIs, state: &StateIs) -> bool {
+    let (stands, runs) = (before.bits.get_ref(), state.bits.get_ref());
+    state.state == StateName::Running
+        && matches!(before.state, StateName::Ready | StateName::Disabled)
+        && !runs.differs
+        && meets(before, state)
+        && runs.mask.get_ref() & !stands.mask.get_ref() != 0
 }
 
 pub(super) const fn is_fault(state: StateName) -> bool {
@@ -51,13 +51,20 @@ impl Check<'_> {
                         ),
                         "masks that tell them apart, the narrower one first",
                     );
-                } else if is_fault(state.state) && !is_fault(before.state) && overlap(before, state) {
+                } else if is_fault(state.state) && !is_fault(before.state) && meets(before, state) {
                     self.refuse(
                         &spanned.span(),
                         format!("a trip may be told as \"{}\", which stands before it", word(before.state)),
                         "the fault first",
                     );
                     // Once is enough, whatever else stands before it.
+                    break;
+                } else if hides_running(before, state) {
+                    self.refuse(
+                        &spanned.span(),
+                        format!("a motor that runs may be told as \"{}\", which stands before it", word(before.state)),
+                        "\"running\" first; or in the mask of the other the bits of \"running\", as they are then",
+                    );
                     break;
                 }
             }
