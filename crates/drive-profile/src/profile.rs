@@ -3,9 +3,10 @@
 use drive_core::Direction;
 
 use crate::{
-    format::{Action, Answer, Bits, FedBy, File, Guard, Register, Sign, Space, Spanned, Step},
+    format::{Action, Answer, Bits, Denial, FedBy, File, Guard, Register, Sign, Space, Spanned, Step},
     ladder::{Gap, Level},
     read_back::ReadBack,
+    source::grade,
 };
 
 /// A profile that was checked. What its file holds is whole: each name that it uses is one of its own.
@@ -109,6 +110,13 @@ impl Profile {
     pub(crate) fn is_fed_by_any_request(&self) -> bool {
         let watchdog = self.file.watchdog.given().map(Spanned::get_ref);
         watchdog.is_some_and(|watchdog| watchdog.fed_by == Answer::Given(FedBy::AnyRequest))
+    }
+
+    /// What an exception of its drive says of a write, where its file lists it by a source that is sound.
+    pub(crate) fn denial(&self, code: u8) -> Option<Denial> {
+        let exceptions = self.file.link.get_ref().exceptions.as_ref()?.get_ref();
+        let listed = exceptions.list.iter().find(|(listed, _)| *listed == code)?;
+        grade(&self.file, &exceptions.source).is_sound().then_some(listed.1)
     }
 
     /// How it is started in a direction.

@@ -698,6 +698,32 @@ async fn an_exception_to_a_run_command_is_no_proof_that_nothing_was_done() {
     assert!(rig.drive.lease().is_some());
 }
 
+/// 14h of an iG5A: "write disabled" (p. 11-3). By the twin of another file the write of the setpoint gets 02h: as one of the codes that a profile
+/// lists it says that nothing was done, and as one that it does not list it says nothing.
+#[tokio::test(start_paused = true)]
+async fn an_exception_that_the_profile_lists_says_what_the_drive_has_done() {
+    let key = "exceptions = { list = [[7, \"no_such_register\"], [8, \"not_now\"], [9, \"not_now\"]], source = \"manuals\" }";
+    let moved = text("invt/goodrive").replace("address = 0x2001", "address = 0x2011");
+    let listed =
+        |list: &str| moved.replace(key, &format!("exceptions = {{ list = {list}, source = \"manuals\" }}"));
+    for (text, said) in [
+        (listed("[[2, \"not_now\"]]"), "the drive refuses it now"),
+        (listed("[[2, \"value_refused\"]]"), "the drive does not take this value"),
+        (moved.clone(), "the drive does not have this register"),
+    ] {
+        let mut rig = over_the_twin_without_its_guard(&text);
+        let error =
+            rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect_err("it is refused");
+        assert_eq!(error.kind(), ErrorKind::Exception, "{error}");
+        assert!(error.to_string().contains(said), "{error}");
+    }
+    for (key, code) in [("ig5a", 0x14), ("wj200", 0x21), ("mx2", 0x22), ("goodrive", 9)] {
+        let file = shipped::find(key).expect("it is shipped").file();
+        let listed = file.link.get_ref().exceptions.as_ref().expect("its manual has some").get_ref();
+        assert!(listed.list.iter().any(|(listed, _)| *listed == code), "{key} {code:02X}h");
+    }
+}
+
 /// A Goodrive's file with a guard on its fault, which reads otherwise once it has tripped.
 fn with_guard() -> String {
     let guard =

@@ -324,6 +324,13 @@ async fn a_guard_that_is_broken_at_the_twins_panel_lets_no_start_through() {
         }
         let refused = rig.drive.start(Direction::Forward).await.expect_err("its words mean something else");
         assert_eq!(refused.kind(), ErrorKind::Refused, "{key} {is_lost}: {refused}");
+        let cause =
+            if key == "ig5a" { "its write enable lets a stop through (ENABLE reads 0)" } else { "reads 1" };
+        let setpoint =
+            rig.drive.set_setpoint(Frequency::from_hertz(20).into()).await.expect_err("it is not taken");
+        for refused in [refused, setpoint] {
+            assert!(refused.kind() == ErrorKind::Refused && refused.to_string().contains(cause), "{refused}");
+        }
         assert!(!rig.machine.observe().running, "{key}");
     }
 }

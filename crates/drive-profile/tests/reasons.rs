@@ -25,6 +25,12 @@ const DIRECTIONS: &str = include_str!("data/directions.toml");
 /// What a place of a good file becomes, and why that is refused. Those that want more than one place are in `refused.rs`.
 const SEEN: &[(&str, &str, &str, &str)] = &[
     (
+        "ig5a",
+        "list = [[0x14, \"not_now\"]]",
+        "list = [[0x94, \"not_now\"]]",
+        "these are no codes of exceptions",
+    ),
+    (
         "directions",
         "{ register = \"STATUS\", mask = 0x0004, value = 0x0004, source = \"made\" }",
         "{ register = \"STATUS\", mask = 0x0001, value = 0x0001, source = \"made\" }",

@@ -209,6 +209,19 @@ impl<'a> Check<'a> {
                 self.refuse(&format.span(), "this is no character format", "one such as \"8E1\"");
             }
         }
+        if let Some(exceptions) = &link.exceptions {
+            self.source(&exceptions.get_ref().source);
+            let mut codes: Vec<u8> = exceptions.get_ref().list.iter().map(|(code, _)| *code).collect();
+            codes.sort_unstable();
+            let is_twice = codes.windows(2).any(|pair| pair[0] == pair[1]);
+            if codes.is_empty() || is_twice || codes.iter().any(|code| !(1..0x80).contains(code)) {
+                self.refuse(
+                    &exceptions.span(),
+                    "these are no codes of exceptions: each is 1 to 127, and stands once",
+                    "exceptions = { list = [[0x22, \"not_now\"]], source = \"...\" }, or nothing",
+                );
+            }
+        }
         if let Some(factory) = link.factory.given()
             && factory.get_ref().parse::<drive_core::SerialSettings>().is_err()
         {

@@ -134,7 +134,8 @@ impl<P: Port> ProfileDrive<P> {
                         profile.file().named(register.get_ref()).and_then(|of| profile.file().place(of))
                     {
                         self.sends(&[Written { space, address, value: word }]);
-                        self.registers.at(Class::Command).write_word(address, word).await?;
+                        let written = self.registers.at(Class::Command).write_word(address, word).await;
+                        written.map_err(|error| self.explained(error))?;
                     }
                 }
                 _ => {}
@@ -432,7 +433,7 @@ impl<P: Port> ProfileDrive<P> {
             }
         }
         let writes = self.profile.file().written(step, self.kept);
-        self.write(step, &writes, class, is_edge).await
+        self.write(step, &writes, class, is_edge).await.map_err(|error| self.explained(error))
     }
 
     /// What is about to be written. A command word is what reads back as one: a word for another register says nothing of it.

@@ -158,6 +158,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
         if status.state.is_moving() || !status.is_explained() {
             return Err(self.refused(command, Refusal::MotorRunning));
         }
-        self.registers.at(Class::Background).change_row(row, word).await
+        let changed = self.registers.at(Class::Background).change_row(row, word).await;
+        changed.map_err(|error| self.explained(error))
     }
 }

@@ -18,7 +18,7 @@ use drive_core::{Error, ExceptionMeaning, Port, Refusal, Registers, SlaveAddress
 
 pub use owner::Owner;
 
-use crate::{ladder::Level, profile::Profile};
+use crate::{format::Denial, ladder::Level, profile::Profile};
 use guards::Guarded;
 #[cfg(feature = "sim")]
 pub(crate) use plan::Block;
@@ -83,6 +83,21 @@ impl<P: Port> ProfileDrive<P> {
         match self.profile.keeps_from(level) {
             Some(why) => Err(Error::Unsupported { what, reason: interned::text(&why) }),
             None => Ok(()),
+        }
+    }
+
+    /// An error of a write, with what the profile lists of its exception.
+    fn explained(&self, error: Error) -> Error {
+        match error {
+            Error::Exception { slave, exchange, code, meaning } => {
+                let meaning = self.profile.denial(code).map_or(meaning, |denial| match denial {
+                    Denial::NoSuchRegister => ExceptionMeaning::NoSuchRegister,
+                    Denial::ValueRefused => ExceptionMeaning::ValueRefused,
+                    Denial::NotNow => ExceptionMeaning::NotNow,
+                });
+                Error::Exception { slave, exchange, code, meaning }
+            }
+            error => error,
         }
     }
 

@@ -76,7 +76,7 @@ impl<P: Port> ProfileDrive<P> {
                 self.agreed = before;
                 return Err(error);
             }
-            written => written?,
+            written => written.map_err(|error| self.explained(error))?,
         }
         self.registers.owe_judgement();
         self.see_setpoint(setpoint, word).await.map_err(Error::after_write)

@@ -175,8 +175,35 @@ pub struct Link {
     pub pause_ms: Answer<u16>,
     /// How long it does not answer after a reset, in ms.
     pub after_reset_ms: Answer<u16>,
+    /// The exceptions by which it says that it has done nothing, beside those of Modbus.
+    pub exceptions: Option<Spanned<Exceptions>>,
     /// Where this is from.
     pub source: Spanned<String>,
+}
+
+/// Exceptions, each with what it says of a write.
+#[derive(Debug, Clone, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Exceptions {
+    /// Code, and what it says.
+    pub list: Vec<(u8, Denial)>,
+    /// Where this is from.
+    pub source: Spanned<String>,
+}
+
+/// Why a write was not carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Denial {
+    /// There is no such register, or it is only read.
+    NoSuchRegister,
+    /// The value is outside of what it takes.
+    ValueRefused,
+    /// Not now: the motor runs, or writing is locked.
+    NotNow,
 }
 
 /// How a file counts addresses.
