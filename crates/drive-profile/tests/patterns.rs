@@ -351,6 +351,74 @@ async fn a_start_that_would_be_refused_is_known_before_anything_is_written() {
     rig.drive.may_start(Direction::Forward, None).await.expect("nothing speaks against it");
 }
 
+/// 0012h of a VF-S15 is UL, the upper limit, and 3104 of an Altivar HSP, both in a register that somebody may lower while the motor runs.
+#[tokio::test(start_paused = true)]
+async fn a_limit_below_the_setpoint_is_refused_before_it_is_given_and_told_of_a_motor_that_runs() {
+    for (key, register, per_hertz) in [("vfs15", 0x0012, 100), ("altivar", 3104, 10)] {
+        let mut rig = rig(shipped::find(key).expect("it is shipped").clone());
+        let hertz = |hertz: u16| Frequency::from_hertz(hertz).into();
+        assert!(rig.machine.poke(register, 25 * per_hertz), "{key}");
+        let above = rig.drive.set_setpoint(hertz(40)).await.expect_err("it is above the limit");
+        assert!(above.to_string().contains("the drive allows 0.00 Hz to 25.00 Hz"), "{key}: {above}");
+        assert!(rig.machine.poke(register, 50 * per_hertz), "{key}");
+        let given = rig.drive.set_setpoint(hertz(40)).await;
+        assert!(given.as_ref().err().is_none_or(Error::only_a_start_shows), "{key}: {given:?}");
+        rig.drive.start(Direction::Forward).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        rig.drive.measurements().await.expect("they are read");
+        assert_eq!(rig.drive.unmet(), None, "{key}");
+
+        assert!(rig.machine.poke(register, 25 * per_hertz), "{key}");
+        rig.drive.measurements().await.expect("they are read");
+        let told = rig.drive.unmet().expect("somebody has lowered it").to_string();
+        assert!(
+            told.contains("no faster than 25.00 Hz") && told.contains("its setpoint is 40.00 Hz"),
+            "{key}: {told}"
+        );
+        rig.drive.set_setpoint(hertz(20)).await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        rig.drive.measurements().await.expect("they are read");
+        assert_eq!(rig.drive.unmet(), None, "{key}: a lower one is below it");
+    }
+}
+
+/// FA01h holds the setpoint of the bus, and any master can write it (E6581913 p. 25-26).
+#[tokio::test(start_paused = true)]
+async fn another_masters_setpoint_is_told_of_a_vf_s15() {
+    let mut rig = rig(shipped::find("vfs15").expect("it is shipped").clone());
+    let given = rig.drive.set_setpoint(Frequency::from_hertz(30).into()).await;
+    assert!(given.as_ref().err().is_none_or(Error::only_a_start_shows), "{given:?}");
+    rig.drive.start(Direction::Forward).await.expect("it starts");
+    rig.machine.written_by_another(0xFA01, 4_500).expect("45 Hz");
+    let status =
+        rig.until("it is told", |status| matches!(status.verdict, Some(Verdict::NotInForce { .. }))).await;
+    assert!(
+        format!("{:?}", status.verdict).contains("another setpoint than was given"),
+        "{:?}",
+        status.verdict
+    );
+}
+
+/// What its owner says holds below what the drive tells, and no higher.
+#[tokio::test(start_paused = true)]
+async fn an_owners_highest_holds_where_the_drive_tells_more() {
+    let family = Family::new(definition(&Arc::new(shipped::find("vfs15").expect("it is shipped").clone())));
+    let profile = Arc::new(shipped::find("vfs15").expect("it is shipped").clone());
+    let owner = Owner::default().with_highest(Frequency::from_hertz(30));
+    let open = move |port, slave| -> Box<dyn Drive> {
+        Box::new(ProfileDrive::<Box<dyn Port>>::new(port, slave, profile.clone(), owner))
+    };
+    let mut rig = Contract::new(family.capabilities(), open, move || {
+        family.machine(SetUp::ForTheBus).expect("it has a twin")
+    })
+    .rig();
+    let error =
+        rig.drive.set_setpoint(Frequency::from_hertz(40).into()).await.expect_err("its owner allows less");
+    assert!(error.to_string().contains("its owner allows 0.00 Hz to 30.00 Hz"), "{error}");
+    assert!(rig.machine.poke(0x0012, 2_000));
+    let error =
+        rig.drive.set_setpoint(Frequency::from_hertz(25).into()).await.expect_err("the drive allows less");
+    assert!(error.to_string().contains("the drive allows 0.00 Hz to 20.00 Hz"), "{error}");
+}
+
 const SPACES: &str = include_str!("data/spaces.toml");
 
 /// By the lines of text that `drived sim` reads: a coil, an input and an input register of one address with a holding register.

@@ -25,7 +25,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
     fn forget(&mut self) {
         self.watch.lose_sight();
         self.forget_guards();
-        (self.comes_down, self.kept, self.at_speed) = (None, None, false);
+        (self.comes_down, self.kept, self.at_speed, self.limited) = (None, None, false, None);
     }
 
     fn recognise(&self, _: &drive_core::Identity) -> Recognised {
@@ -37,7 +37,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
     }
 
     fn unmet(&self) -> Option<Refusal> {
-        self.found_otherwise()
+        self.found_otherwise().or(self.limited)
     }
 
     /// The words of its fingerprints, of a drive that has any of one value. Its guards are read in any case.
@@ -68,6 +68,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
             // Somebody at the drive may set it up otherwise at any time; that it cannot be asked now says nothing.
             self.read_guards(Class::Background).await.ok();
         }
+        self.see_highest().await;
         Ok(measured)
     }
 

@@ -4,6 +4,7 @@ mod cell;
 mod command;
 mod driven;
 mod guards;
+mod highest;
 mod owner;
 mod plan;
 mod reading;
@@ -52,6 +53,8 @@ pub struct ProfileDrive<P> {
     comes_down: Option<Option<u32>>,
     /// The last status told that the motor was at its speed.
     at_speed: bool,
+    /// That the drive does not let its motor reach the setpoint that was given, as it was read last.
+    limited: Option<Refusal>,
 }
 
 impl<P: Port> ProfileDrive<P> {
@@ -75,6 +78,7 @@ impl<P: Port> ProfileDrive<P> {
             lets_coast: false,
             comes_down: None,
             at_speed: false,
+            limited: None,
         }
     }
 

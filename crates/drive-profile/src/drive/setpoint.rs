@@ -259,14 +259,16 @@ impl<P: Port> ProfileDrive<P> {
         let high = i64::from(limits.high);
         let full_scale_is_owners = fact.full_scale.as_ref().is_some_and(|name| name.get_ref() == "owner");
         let Some(name) = &limits.high_in else { return Some((high, full_scale_is_owners)) };
-        let is_owners = name.get_ref() == "owner";
-        let allowed = if is_owners {
-            let highest = self.owner.highest?;
-            let [numerator, denominator] = hertz?;
+        let owners = self.owner.highest.zip(hertz).map(|(highest, [numerator, denominator])| {
             i64::from(highest.centihertz()).saturating_mul(denominator) / numerator.saturating_mul(100)
-        } else {
-            self.allowed(register, name.get_ref(), held)?
+        });
+        let drives = match name.get_ref().as_str() {
+            "owner" => owners?,
+            name => self.allowed(register, name, held)?,
         };
+        // What its owner has said as well holds where it is less.
+        let allowed = owners.map_or(drives, |owners| owners.min(drives));
+        let is_owners = owners == Some(allowed) && (name.get_ref() == "owner" || allowed < drives);
         Some((high.min(allowed), full_scale_is_owners || is_owners && allowed < high))
     }
 

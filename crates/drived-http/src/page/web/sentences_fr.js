@@ -356,6 +356,8 @@ const PATTERNS = [
   [/^the line is down \((.+)\)$/, why => `la ligne est coupée (${why})`],
   [/^its owner allows (.+) to (.+)$/, (low, high) => `son propriétaire admet ${number(low)} à ${number(high)}`],
   [/^the drive allows (.+) to (.+)$/, (low, high) => `le variateur admet ${number(low)} à ${number(high)}`],
+  [/^the drive lets its motor turn no faster than (\S+ Hz) \((.+)\), and its setpoint is (\S+ Hz): raise that at the drive, or give a lower setpoint$/, (high, code, asked) =>
+    `le variateur ne laisse pas tourner son moteur au-delà de ${number(high)} (${code}), et sa consigne est ${number(asked)} : relever cette limite sur le variateur, ou donner une consigne plus basse`],
   [/^the drive takes steps of (.+)$/, step => `le variateur procède par pas de ${number(step)}`],
   [/^the watchdog is (.+); the contract says (.+)$/, (is, contract) => `surveillance : ${reaction(is)} ; contrat : ${reaction(contract)}`],
   [/^nothing was heard for ([\d.]+) s, whoever was asked$/, time => `rien n’a été entendu pendant ${number(time)} s, qui que l’on ait interrogé`],
