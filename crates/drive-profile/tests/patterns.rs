@@ -397,6 +397,49 @@ async fn another_masters_setpoint_is_told_of_a_vf_s15() {
     );
 }
 
+/// An Altivar that its terminals run holds its chart where it was: 23h, "switched on" (ATV312 BBV51701 p. 22 has another word for what turns).
+/// The motor of this machine shows its run bit to nobody.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_turns_steadily_by_its_terminals_while_its_word_says_ready_is_told_running_and_not_started()
+ {
+    let blind = SPLIT
+        .replace("mask = 0x0001, value = 0x0001", "mask = 0x0010, value = 0x0010")
+        .replace("mask = 0x0001, value = 0x0000", "mask = 0x0010, value = 0x0000");
+    // Of who commands it tells nothing.
+    let owner = |text: &str, key: &str, mask: &str| {
+        let known = format!(
+            "{key} = {{ bits = {{ register = \"STATUS\", mask = {mask}, value = {mask}, source = \"made\" }}, proves = \"bus\" }}"
+        );
+        assert_eq!(text.matches(&known).count(), 1, "{known}");
+        text.replace(&known, &format!("{key} = \"unknown\""))
+    };
+    let blind = owner(&owner(&blind, "command", "0x0200"), "reference", "0x0100");
+    let mut rig = rig_of(SPLIT, &blind);
+    rig.drive.status().await.expect("it answers");
+    rig.machine.panel(Panel::TakeControl);
+    rig.machine.panel(Panel::Reference(Frequency::from_hertz(20)));
+    rig.machine.panel(Panel::Run);
+    rig.until_machine("it runs", |seen| seen.output_frequency == 2_000).await;
+    rig.poll_for(Duration::from_secs(4)).await;
+    let status = rig.drive.status().await.expect("it answers");
+    assert_eq!((status.state, status.motion), (State::Running, drive_core::Motion::Driven));
+    sleep(Duration::from_millis(1)).await;
+    let began = Instant::now();
+    let refused = rig.drive.start(Direction::Forward).await.expect_err("it runs by another's command");
+    assert_eq!(
+        (refused.kind(), written_since(&rig, 0x091B, began)),
+        (ErrorKind::Refused, vec![]),
+        "{refused}"
+    );
+    // A stop by the bus does not stop it, and is not told to have.
+    let stop = rig.drive.stop(StopMode::Ramp).await.expect_err("it turns on");
+    assert_eq!(stop.kind(), ErrorKind::NotConfirmed, "{stop}");
+    rig.machine.panel(Panel::Stop);
+    let stands =
+        rig.until("its output is gone", |status| status.output_frequency == Some(Frequency::ZERO)).await;
+    assert_eq!(stands.state, State::Ready);
+}
+
 /// What its owner says holds below what the drive tells, and no higher.
 #[tokio::test(start_paused = true)]
 async fn an_owners_highest_holds_where_the_drive_tells_more() {

@@ -26,6 +26,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
         self.watch.lose_sight();
         self.forget_guards();
         (self.comes_down, self.kept, self.at_speed, self.limited) = (None, None, false, None);
+        self.steady.forget();
     }
 
     fn recognise(&self, _: &drive_core::Identity) -> Recognised {

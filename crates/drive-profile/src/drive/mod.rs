@@ -10,6 +10,7 @@ mod plan;
 mod reading;
 mod setpoint;
 mod sight;
+mod steady;
 mod tables;
 mod watchdog;
 
@@ -25,6 +26,7 @@ use guards::Guarded;
 pub(crate) use plan::Block;
 pub(crate) use plan::{Words, is_double};
 use sight::Sight;
+use steady::Steady;
 
 /// Behind every so many statuses the command is read back, while one of this side stands: what it does shows in each.
 const STATUSES_PER_TURN: u16 = 4;
@@ -55,6 +57,8 @@ pub struct ProfileDrive<P> {
     at_speed: bool,
     /// That the drive does not let its motor reach the setpoint that was given, as it was read last.
     limited: Option<Refusal>,
+    /// An output that does not come down where the status word says that nothing runs.
+    steady: Steady,
 }
 
 impl<P: Port> ProfileDrive<P> {
@@ -79,6 +83,7 @@ impl<P: Port> ProfileDrive<P> {
             comes_down: None,
             at_speed: false,
             limited: None,
+            steady: Steady::default(),
         }
     }
 

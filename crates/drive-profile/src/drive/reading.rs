@@ -103,7 +103,8 @@ impl<P: Port> ProfileDrive<P> {
         let output_frequency = sight.output.and_then(|output| self.frequency(words, output));
         let fits = |test: &Option<Test>| test.as_ref()?.fits(words);
         self.at_speed = fits(&sight.at_setpoint) == Some(true);
-        let state = self.coming_down(sight.state(words), output_frequency);
+        let state = self.by_output(sight.state(words), output_frequency);
+        let state = self.coming_down(state, output_frequency);
         let control = match owned(words, sight.commanded_by.as_ref()) {
             Told::Yes => Some(Control::Bus),
             Told::No(_) => Some(Control::Local),
@@ -130,6 +131,16 @@ impl<P: Port> ProfileDrive<P> {
             at: self.registers.snapshot_time(),
             ..Status::default()
         }
+    }
+
+    /// A motor that its terminals run may be none by a status word that tells of the bus's command alone. While one of this side stands, the
+    /// word says what becomes of it.
+    fn by_output(&mut self, state: State, output: Option<Frequency>) -> State {
+        if self.watch.run.lease().is_some() {
+            self.steady.forget();
+            return state;
+        }
+        self.steady.see(state, output)
     }
 
     /// Some drives tell that they run until the motor stands: behind a stop of this side, and as long as the output only goes down and does
