@@ -599,6 +599,27 @@ async fn the_time_of_a_watchdog_is_read_where_its_profile_names_the_register_and
     assert!(said.iter().any(|what| what.contains(told)), "{said:?}");
 }
 
+/// Somebody arms it at the panel, or sets it shorter, while the line is not lost: whoever feeds it by asking has to read it anew.
+#[tokio::test(start_paused = true)]
+async fn a_watchdog_that_is_armed_at_the_panel_between_two_connects_is_told_to_have_changed() {
+    let fed_by_any = "time = \"WDT\"\nzero_is = \"off\"\nfrom_factory = false\nfed_by = \"any_request\"";
+    let mut rig = rig(with_watchdog(fed_by_any));
+    assert_eq!(rig.drive.watchdog().await.expect("it is read").timeout, None);
+    rig.drive.measurements().await.expect("they are read");
+    assert_eq!(rig.drive.take_changed(), None, "it is as it was");
+    assert!(rig.machine.poke(0x0120, 20));
+    rig.drive.measurements().await.expect("they are read");
+    assert_eq!(rig.drive.take_changed(), Some(drive_core::Ground::Watchdog));
+    assert_eq!(rig.drive.take_changed(), None, "once");
+    let found = rig.drive.watchdog().await.expect("it is read");
+    assert_eq!((found.timeout, rig.drive.take_changed()), (Some(Duration::from_secs(2)), None));
+    // Behind a lost line it is read in any case.
+    rig.drive.forget();
+    assert!(rig.machine.poke(0x0120, 0));
+    rig.drive.measurements().await.expect("they are read");
+    assert_eq!(rig.drive.take_changed(), None);
+}
+
 /// Behind a setpoint below the output a stop does not show before the output is there: until then nothing tells that it has arrived.
 #[tokio::test(start_paused = true)]
 async fn no_run_word_follows_a_stop_that_is_not_seen_yet() {

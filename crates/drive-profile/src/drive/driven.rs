@@ -1,7 +1,9 @@
 //! The drive as every family is one: [`Drive`] over what the other modules do.
 
+use std::time::Duration;
+
 use drive_core::{
-    Class, Command, Direction, Drive, Error, Faults, Identity, Lease, Measurements, Port, Recognised,
+    Class, Command, Direction, Drive, Error, Faults, Ground, Identity, Lease, Measurements, Port, Recognised,
     Refusal, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Withdrawn,
     Written, async_trait, registers::refuse_commands,
 };
@@ -11,7 +13,22 @@ use super::ProfileDrive;
 #[async_trait]
 impl<P: Port> Drive for ProfileDrive<P> {
     drive_core::told_by!(registers);
-    drive_core::watched_by!(watch);
+
+    fn lease(&self) -> Option<Lease> {
+        self.watch.run.lease()
+    }
+
+    fn take_changed(&mut self) -> Option<Ground> {
+        self.watch.take_changed().or_else(|| self.changed.take())
+    }
+
+    fn set_coast_time(&mut self, time: Option<Duration>) {
+        self.watch.shaft.set_coast_time(time);
+    }
+
+    fn set_injection_time(&mut self, time: Option<Duration>) {
+        self.watch.shaft.set_injection_time(time);
+    }
 
     fn run_word_for(&self, direction: Direction) -> Option<u16> {
         self.profile.file().run_word(self.profile.start(direction)?, self.kept)
@@ -26,6 +43,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
         self.watch.lose_sight();
         self.forget_guards();
         (self.comes_down, self.kept, self.at_speed, self.limited) = (None, None, false, None);
+        (self.watchdog_time, self.changed) = (None, None);
         self.steady.forget();
     }
 
@@ -69,7 +87,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
             // Somebody at the drive may set it up otherwise at any time; that it cannot be asked now says nothing.
             self.read_guards(Class::Background).await.ok();
         }
-        self.see_highest().await;
+        self.see_settings().await;
         Ok(measured)
     }
 

@@ -4,11 +4,11 @@ mod cell;
 mod command;
 mod driven;
 mod guards;
-mod highest;
 mod owner;
 mod plan;
 mod reading;
 mod setpoint;
+mod settings;
 mod sight;
 mod steady;
 mod tables;
@@ -16,7 +16,9 @@ mod watchdog;
 
 use std::sync::Arc;
 
-use drive_core::{Error, ExceptionMeaning, Port, Refusal, Registers, SlaveAddress, Status, Watch, interned};
+use drive_core::{
+    Error, ExceptionMeaning, Ground, Port, Refusal, Registers, SlaveAddress, Status, Watch, interned,
+};
 
 pub use owner::Owner;
 
@@ -57,6 +59,10 @@ pub struct ProfileDrive<P> {
     at_speed: bool,
     /// That the drive does not let its motor reach the setpoint that was given, as it was read last.
     limited: Option<Refusal>,
+    /// The time of its watchdog as it was read last, in counts.
+    watchdog_time: Option<i64>,
+    /// A setting was found otherwise than it was read before, and nobody was told yet.
+    changed: Option<Ground>,
     /// An output that does not come down where the status word says that nothing runs.
     steady: Steady,
 }
@@ -83,6 +89,8 @@ impl<P: Port> ProfileDrive<P> {
             comes_down: None,
             at_speed: false,
             limited: None,
+            watchdog_time: None,
+            changed: None,
             steady: Steady::default(),
         }
     }

@@ -81,8 +81,8 @@ impl Profile {
                 .saturating_add(command_exchanges)
                 .saturating_mul(3)
                 .saturating_add(2),
-            // With them the guards are looked at, and how fast it may turn.
-            measurement_exchanges: u8::try_from(slow.len() + self.guards().len() + self.highest().len())
+            // With them the guards and the settings are looked at.
+            measurement_exchanges: u8::try_from(slow.len() + self.guards().len() + self.settings().len())
                 .unwrap_or(u8::MAX),
             quantities: interned::list(&self.quantities()),
             ..least

@@ -6,7 +6,7 @@ use std::{collections::BTreeSet, time::Duration};
 use drive_core::{Class, Error, Port, Result, Watchdog};
 
 use super::{ProfileDrive, Words};
-use crate::format::{Access, Answer, FedBy, UnitName};
+use crate::format::{Answer, FedBy, UnitName};
 
 /// A shorter one no line feeds by asking.
 const SHORTEST: Duration = Duration::from_millis(100);
@@ -22,9 +22,7 @@ impl<P: Port> ProfileDrive<P> {
         if watchdog.fed_by == Answer::Given(FedBy::CommandWrite) {
             return unsupported("a command word alone feeds it, and none is repeated");
         }
-        let readable = |name: &&str| profile.file().named(name).is_some_and(|of| of.access != Access::Write);
-        let name = watchdog.time.given().map(|name| name.get_ref().as_str());
-        let Some((name, cell)) = name.filter(readable).and_then(|name| Some((name, profile.cell(name)?)))
+        let Some((name, cell)) = profile.watchdog_time().and_then(|name| Some((name, profile.cell(name)?)))
         else {
             return unsupported("its profile does not know in which register its time can be read");
         };
@@ -33,6 +31,7 @@ impl<P: Port> ProfileDrive<P> {
             let read = self.read_block(Class::Background, block).await?;
             words.keep(block, read);
         }
+        self.see_watchdog_time(&profile, &words);
         let milliseconds = match cell.unit {
             UnitName::Second => cell.hundredths(&words, UnitName::Second).map(|of| of.saturating_mul(10)),
             UnitName::Millisecond => cell.hundredths(&words, UnitName::Millisecond).map(|of| of / 100),
