@@ -114,7 +114,7 @@ fn kinds() -> Vec<Kind> {
             trip: 1,
             ..kind("acs550", "abb.py", "ABB")
         },
-        // Three patterns of control that no shipped profile has at motion.
+        // Patterns of control that no shipped profile has at motion.
         Kind {
             text: Some(include_str!("../crates/drive-profile/tests/data/abb.toml")),
             arguments: &["355"],
@@ -134,6 +134,13 @@ fn kinds() -> Vec<Kind> {
             trip: 1,
             options: &[],
             ..kind("signed", "nobody.py", "setpoint is the command")
+        },
+        Kind {
+            text: Some(include_str!("../crates/drive-profile/tests/data/directions.toml")),
+            arguments: &["directions"],
+            trip: 1,
+            options: &[],
+            ..kind("directions", "nobody.py", "coils of directions")
         },
     ]
 }

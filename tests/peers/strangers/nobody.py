@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Two drives that nobody makes, by what their kind is said to be: KIND split (run, direction and reset in registers of their own, as a
-DURApulse GS2 has them) or signed (the setpoint is the run command, its sign the direction and 0 the stop, as a DMM DYN4 has it)."""
+"""Three drives that nobody makes, by what their kind is said to be: KIND split (run, direction and reset in registers of their own, as a
+DURApulse GS2 has them), signed (the setpoint is the run command, its sign the direction and 0 the stop, as a DMM DYN4 has it) or
+directions (a run coil for each direction, and both on or both off is a stop)."""
 from common import Drive, Ex, bits, main, s16
 
 
@@ -98,6 +99,55 @@ class Signed(Nobody):
         return s16(self.speed) / 10
 
 
+class Directions(Nobody):
+    name = "directions"
+    fcs = (1, 3, 5, 6, 15, 16)
+    max_coils = 8
+
+    def power_up(self):
+        self.speed, self.way = 0, {1: False, 2: False, 3: False}
+
+    def tables(self):
+        self.reg(0x0110, self.status)
+        self.reg(0x091A, lambda: self.speed, self.set_speed)
+        for a in (1, 2, 3):
+            self.C[a] = lambda a=a: self.way[a]
+            self.CW[a] = lambda v, a=a: self.put(a, v)
+
+    def set_speed(self, v):
+        if v > 500:
+            raise Ex(3)
+        self.speed = v
+
+    def put(self, a, v):
+        rises = v and not self.way[a]
+        if a == 3:
+            self.way[a] = v
+            if rises:
+                self.lose()
+                self.reset_fault()
+        else:
+            self.way[a] = v and not (self.tripped or self.local)
+
+    def lose(self):
+        self.way[1] = self.way[2] = False
+
+    def on_trip(self):
+        self.lose()
+
+    def on_remote(self):
+        self.lose()
+
+    def wants(self):
+        return self.way[1] != self.way[2]
+
+    def backwards(self):
+        return self.way[2]
+
+    def target(self):
+        return -self.speed / 10 if self.way[2] else self.speed / 10
+
+
 if __name__ == "__main__":
     import sys
-    main({"split": Split, "signed": Signed}[sys.argv.pop(1)])
+    main({"split": Split, "signed": Signed, "directions": Directions}[sys.argv.pop(1)])
