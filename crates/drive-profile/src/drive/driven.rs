@@ -42,7 +42,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
     fn forget(&mut self) {
         self.watch.lose_sight();
         self.forget_guards();
-        (self.comes_down, self.kept, self.at_speed, self.limited) = (None, None, false, None);
+        (self.comes_down, self.kept, self.at_speed) = (None, None, false);
         (self.watchdog_time, self.changed) = (None, None);
         self.steady.forget();
     }

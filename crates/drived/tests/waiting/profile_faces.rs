@@ -10,7 +10,10 @@ use crate::support::{File, Running, Sim, drived, free_port, get, path, run};
 use crate::terminal::Terminal;
 use serde_json::Value;
 
-/// What a WJ200 does not tell: which of two words of its output is first was not read, so that its file has no output.
+/// A WJ200 by a file of somebody who does not know where its output stands.
+const WJ200: &str = include_str!("../../drive-profile/profiles/hitachi/wj200.toml");
+
+/// What a WJ200 does not tell.
 const OWNER: &str = "whether the drive tells who commands it is not known";
 
 /// A text of a face; what has to be in it, and what must not.
@@ -30,10 +33,19 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
     let mqtt = broker.as_ref().map_or_else(String::new, |broker| {
         format!("[mqtt]\nservers = [\"mqtt://127.0.0.1:{}\"]\n", broker.port)
     });
+    let profiles = path("profile-faces-profiles");
+    fs::create_dir_all(&profiles).expect("there is room");
+    let blind = WJ200.replacen("key = \"wj200\"", "key = \"blind\"", 1).replacen(
+        "output = \"D001\"",
+        "output = \"unknown\"",
+        1,
+    );
+    fs::write(profiles.join("blind.toml"), blind).expect("it can be written");
     let text = format!(
-        "state = \"{}\"\n{mqtt}[http]\nlisten = \"127.0.0.1:{http}\"\n[[gateways]]\nlisten = \"127.0.0.1:{gateway}\"\n\
-         [groups]\npumps = [\"pump\"]\n[lines.bench]\nport = \"{},19200,8N1\"\n[[drives]]\nline = \"bench\"\ndrive = \"wj200@3\"\nname = \"pump\"\ncontrol = true\n\
+        "profiles = \"{}\"\nstate = \"{}\"\n{mqtt}[http]\nlisten = \"127.0.0.1:{http}\"\n[[gateways]]\nlisten = \"127.0.0.1:{gateway}\"\n\
+         [groups]\npumps = [\"pump\"]\n[lines.bench]\nport = \"{},19200,8N1\"\n[[drives]]\nline = \"bench\"\ndrive = \"blind@3\"\nname = \"pump\"\ncontrol = true\n\
          options = {{ highest = \"50Hz\", commands-alone = \"yes\" }}\n",
+        profiles.display(),
         state.display(),
         sim.link()
     );
@@ -162,6 +174,7 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
     assert!(kept.code != Some(0) && kept.err.contains("its family has no parameters"), "{kept:?}");
     let _ = fs::remove_file(&report);
     let _ = fs::remove_dir_all(&state);
+    let _ = fs::remove_dir_all(&profiles);
 }
 
 /// The event stream, by which the page goes.
