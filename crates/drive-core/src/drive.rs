@@ -244,7 +244,8 @@ pub trait Drive: Send {
     /// of setpoint that the family does not take.
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()>;
 
-    /// Resets the present fault, once. Returns the status in which the drive shows none. The motor does not start: a reset is
+    /// Resets the present fault, once. Whether there is one is looked at first: without one **nothing is written**, for the words by which
+    /// some families reset take the voltage from a motor that runs. Returns the status in which the drive shows none. The motor does not start: a reset is
     /// sent only where it is proved that nobody's run command becomes active by it. Some drives forget their setpoint by it;
     /// give it again before a start.
     ///

@@ -136,8 +136,7 @@ impl Supervisor {
         let status = self.status.as_ref().map(|status| &*status.value).ok_or(Refused::NotConnected)?;
         Ok(match order {
             Order::AcceptIdentity => None,
-            // The words by which some families reset take the voltage from a motor that runs: without a fault none is written.
-            Order::ResetFaults if !status.is_fault() => None,
+            // Its driver looks whether there is a fault: the last status may be older than a trip.
             Order::ResetFaults => Some(Job::ResetFaults),
             Order::Release => Some(Job::Release),
             Order::Persist => Some(Job::Persist),

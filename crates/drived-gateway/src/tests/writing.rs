@@ -18,7 +18,7 @@ use drived_doors::{
     crowd::{Crowd, Limits},
 };
 use drived_plant::plant::{
-    commands::{Action, Request, Target},
+    commands::{Action, LIFETIME, Lifetime, Request, Target},
     testing::TestPlant,
 };
 
@@ -105,7 +105,10 @@ fn stop_of_all(arrived: Instant) -> (Caller, Request) {
     let caller = Caller::new("page", "page", Rights::ALL);
     let (target, action, lifetime) =
         (Target::All, Action::Stop(StopMode::Ramp.into()), Duration::from_secs(1));
-    (caller, Request { id: None, target, action, expects: None, lifetime, arrived })
+    (
+        caller,
+        Request { id: None, target, action, expects: None, lifetime: Lifetime::Usual(lifetime), arrived },
+    )
 }
 
 #[tokio::test(start_paused = true)]
@@ -377,7 +380,14 @@ async fn a_motor_that_somebody_else_starts_behind_a_stop_is_not_stopped_for_the_
     let action =
         Action::Start { direction: Direction::Forward, setpoint, until: drive_fleet::Until::default() };
     let (target, lifetime) = (Target::Drive("pump 1".to_owned()), Duration::from_secs(1));
-    let request = Request { id: None, target, action, expects: None, lifetime, arrived: Instant::now() };
+    let request = Request {
+        id: None,
+        target,
+        action,
+        expects: None,
+        lifetime: Lifetime::Usual(lifetime),
+        arrived: Instant::now(),
+    };
     let told = plant.plant.command(&caller, request, Duration::from_secs(3)).await.unwrap();
     assert!(plant.machines[0].observe().running, "{told:?}");
     sleep(Duration::from_secs(60)).await;
@@ -516,7 +526,7 @@ async fn the_silence_of_who_started_a_motor_stops_no_run_that_somebody_began_lon
         peer.ask(1, &read(ETA, 1)).await;
     }
     let drive = plant.plant.fleet().drive("pump 1").unwrap();
-    let begun = drive.run(drive_core::Direction::Forward, drive_core::Frequency::from_hertz(20)).await;
+    let begun = drive.run(Direction::Forward, Frequency::from_hertz(20)).await;
     assert!(begun.is_confirmed(), "{begun}");
     drop(peer);
     sleep(Duration::from_secs(30)).await;
@@ -526,16 +536,38 @@ async fn the_silence_of_who_started_a_motor_stops_no_run_that_somebody_began_lon
 /// He has taken the motor over, whichever way it turns since, and is heard by nobody's time-out.
 #[tokio::test(start_paused = true)]
 async fn the_silence_of_who_started_a_motor_stops_none_that_somebody_else_has_started_again_since() {
-    for direction in [drive_core::Direction::Forward, drive_core::Direction::Reverse] {
+    for direction in [Direction::Forward, Direction::Reverse] {
         let (plant, _desk, mut peer) = started_by_one_who_is_watched(true).await;
         sleep(Duration::from_secs(3)).await;
         peer.ask(1, &read(ETA, 1)).await;
         let drive = plant.plant.fleet().drive("pump 1").unwrap().commanded_by("anna");
-        let begun = drive.start_at(direction, drive_core::Frequency::from_hertz(20)).await;
+        let begun = drive.start_at(direction, Frequency::from_hertz(20)).await;
         assert!(begun.is_confirmed(), "{begun}");
         sleep(Duration::from_secs(30)).await;
         assert!(plant.machines[0].observe().running, "{direction}");
     }
+}
+
+/// A motor that is turned round takes its ramps for it.
+#[tokio::test(start_paused = true)]
+async fn the_silence_of_who_started_a_motor_stops_none_that_somebody_else_is_turning_round_meanwhile() {
+    let (plant, _desk, _peer) = started_by_one_who_is_watched(true).await;
+    sleep(Duration::from_millis(4_000)).await;
+    let person = Caller::new("anna", "page", Rights::ALL);
+    let setpoint = Some(Frequency::from_hertz(20).into());
+    let start = Action::Start { direction: Direction::Reverse, setpoint, until: drive_fleet::Until::InForce };
+    let target = Target::Drive("pump 1".to_owned());
+    let request = Request {
+        id: None,
+        target,
+        action: start,
+        expects: None,
+        lifetime: LIFETIME,
+        arrived: Instant::now(),
+    };
+    let told = plant.plant.begin(&person, request).unwrap();
+    sleep(Duration::from_secs(40)).await;
+    assert_eq!(plant.machines[0].observe().output_frequency, -2_000, "{:?}", told.borrow());
 }
 
 /// What was refused has started nothing.
@@ -543,8 +575,7 @@ async fn the_silence_of_who_started_a_motor_stops_none_that_somebody_else_has_st
 async fn the_silence_of_who_started_a_motor_stops_it_behind_a_start_of_somebody_else_that_was_refused() {
     let (plant, _desk, _peer) = started_by_one_who_is_watched(true).await;
     let drive = plant.plant.fleet().drive("pump 1").unwrap().commanded_by("anna");
-    let refused =
-        drive.start_at(drive_core::Direction::Forward, drive_core::Frequency::from_hertz(400)).await;
+    let refused = drive.start_at(Direction::Forward, Frequency::from_hertz(400)).await;
     assert!(!refused.is_confirmed(), "{refused}");
     sleep(Duration::from_secs(30)).await;
     assert!(!plant.machines[0].observe().running);

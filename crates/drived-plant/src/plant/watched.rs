@@ -36,6 +36,8 @@ const FILE: &str = "watched.json";
 const KEPT_WITHIN: Duration = Duration::from_millis(400);
 /// A start waits no longer than a client has patience, a minute at the most: a motor that stands then was not started.
 const STARTED_WITHIN: Duration = Duration::from_secs(61);
+/// Within what a start shows that was given to a motor that runs.
+const START_SHOWS: Duration = Duration::from_secs(8);
 /// How often it is looked who is silent.
 const LOOKED: Duration = Duration::from_millis(500);
 
@@ -206,12 +208,16 @@ impl Watched {
         }
     }
 
-    /// A drive is to be started. Who started it before a stop is not the one who has to be heard.
-    pub(super) fn start_anew(&self, drive: &Place) {
+    /// A drive is to be started by somebody. Who started it before a stop is not the one who has to be heard. Of a motor that runs it is not
+    /// judged who is silent before that start has shown: it would end the run that somebody is about to have.
+    pub(super) fn start_anew(&self, drive: &Place, commander: &str) {
         let mut drives = self.lock();
-        if drives.get(drive).is_some_and(|watch| watch.is_stopped) {
+        let Some(watch) = drives.get_mut(drive) else { return };
+        if watch.is_stopped {
             drives.remove(drive);
             self.change();
+        } else if watch.starter.door != commander {
+            watch.heard = watch.heard.max(Instant::now() + START_SHOWS);
         }
     }
 

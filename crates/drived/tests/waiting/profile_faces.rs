@@ -11,7 +11,7 @@ use crate::terminal::Terminal;
 use serde_json::Value;
 
 /// A WJ200 by a file of somebody who does not know where its output stands.
-const WJ200: &str = include_str!("../../drive-profile/profiles/hitachi/wj200.toml");
+const WJ200: &str = include_str!("../../../drive-profile/profiles/hitachi/wj200.toml");
 
 /// What a WJ200 does not tell.
 const OWNER: &str = "whether the drive tells who commands it is not known";

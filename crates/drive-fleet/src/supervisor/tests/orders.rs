@@ -368,3 +368,22 @@ fn a_start_tells_the_setpoint_that_it_uses_and_that_at_zero_nothing_turns() {
         }
     }
 }
+
+/// A status is as old as the last poll, and a trip may be younger.
+#[test]
+fn a_reset_asks_the_drive_itself_whether_there_is_a_fault_and_is_confirmed_by_what_it_says() {
+    let mut rig = Rig::ready();
+    rig.drive.log.clear();
+    rig.drive.trip(9);
+    let id = rig.order(Order::ResetFaults);
+    rig.pass(100 * MS);
+    assert!(rig.drive.log.contains(&Job::ResetFaults), "{:?}", rig.drive.log);
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
+    assert_eq!(rig.drive.status.fault_code, None);
+
+    rig.drive.trip(9);
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    let id = rig.order(Order::ResetFaults);
+    rig.pass(6_000 * MS);
+    assert!(rig.outcome(id).is_some_and(|outcome| !outcome.is_confirmed()), "{:?}", rig.outcome(id));
+}

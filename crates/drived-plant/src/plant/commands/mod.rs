@@ -295,7 +295,8 @@ impl Plant {
         }
         passing.may_begin(caller, &request, asked_after, meant.drives())?;
         if matches!(request.action, Action::Start { .. }) {
-            meant.drives().iter().for_each(|drive| self.0.watched.start_anew(drive.place()));
+            let commander = &caller.name;
+            meant.drives().iter().for_each(|drive| self.0.watched.start_anew(drive.place(), commander));
         }
         let work = Work::new(self.clone(), caller, &request, meant);
         match self.0.commands.find_or_add(caller, request, work.view())? {
