@@ -4,7 +4,6 @@
 
 mod alarm_life;
 mod doctor;
-mod end;
 #[path = "../mqtt/home.rs"]
 mod home;
 mod home_assistant;

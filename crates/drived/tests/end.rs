@@ -1,5 +1,10 @@
 //! The end of the program beside a drive that is silent: whoever has a motor beside it stops it by his own door, until the last drive is
 //! done. Over a pty, in real time; nothing here asserts a duration. Where mosquitto is not installed it is said why this is skipped.
+#![cfg(unix)]
+
+#[path = "mqtt/rig.rs"]
+mod rig;
+mod support;
 
 use std::{
     fs,
@@ -10,10 +15,10 @@ use std::{
     time::{Duration, SystemTime, UNIX_EPOCH},
 };
 
-use crate::rig::Mosquitto;
-use crate::support::{File, Running, Sim, ask, free_port, path, run};
 use drive_sparkplug::{Metric, Payload, Raw};
+use rig::Mosquitto;
 use serde_json::{Value, json};
+use support::{File, Running, Sim, ask, free_port, path, run};
 
 /// Pump 1 is stopped at the exit and falls silent, pumps 2 to 6 are left as they are, each stopped by another door, and pump 7 stands.
 struct Plant {
@@ -96,7 +101,7 @@ impl Plant {
         assert!(!self.daemon.has_ended(), "pump 1 is waited for");
     }
 
-    fn by_socket(&self, subcommand: &[&str]) -> crate::support::Ended {
+    fn by_socket(&self, subcommand: &[&str]) -> support::Ended {
         run(&[subcommand, &["--socket", &self.socket]].concat())
     }
 
@@ -179,7 +184,7 @@ fn until_the_last_drive_is_done_a_motor_is_stopped_by_every_door_and_none_is_sta
     plant.by_socket(&["stop", "pump 3"]).assert_done();
     plant.comes_to_a_stand(3);
 
-    plant.broker.publish("drived/drive/pump_7/command", &crate::rig::start("late"), &[]);
+    plant.broker.publish("drived/drive/pump_7/command", &rig::start("late"), &[]);
     let refused = ear.outcome("late");
     assert_eq!(
         (&refused["outcome"], &refused["reason"]),
