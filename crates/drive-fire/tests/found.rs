@@ -191,6 +191,11 @@ fn no_order_of_a_line_that_was_a_find_is_one_again() {
             "afhmimiljafjefilafjchjehmljml",
             "the answer to an earlier question of a shape that was owed, and taken, once already",
         ),
+        (
+            "Wire",
+            "fjjdjkfaikackmimjfakjhlifl",
+            "the same where two of the lengths were answered behind a damaged answer, and the model was wrong",
+        ),
         ("Gateway", "aaaaaaaaaaaaaaaaa", "seventeen stops in vain end after 300 s: the model was wrong"),
         ("Gateway", &"a".repeat(60), "the same of sixty"),
     ] {

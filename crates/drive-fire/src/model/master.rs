@@ -157,6 +157,8 @@ struct UnderWay {
     end: Instant,
     number: u16,
     call: Option<u32>,
+    /// An answer of this shape was owed when it was asked: which of the two has come nobody knows by then.
+    behind_an_owed: bool,
 }
 
 impl UnderWay {
@@ -351,7 +353,7 @@ impl World {
         }
         self.refuses_longer |= how == S::Refuse && asked.pdu[0] == 3;
         if how != S::Damage {
-            self.owed.remove(&asked.read());
+            self.is_answered(&asked);
         }
         let pdu = match how {
             S::Refuse => vec![asked.pdu[0] | 0x80, 4],
@@ -368,6 +370,14 @@ impl World {
         self.hears(at, &frame)?;
         self.answered_at.insert(asked.slave, at);
         Ok(())
+    }
+
+    /// A right answer has come: what was owed before it may still come, as far as the line can know.
+    fn is_answered(&mut self, asked: &UnderWay) {
+        match asked.behind_an_owed {
+            true => self.owed.insert(asked.read(), self.now + MEMORY),
+            false => self.owed.remove(&asked.read()),
+        };
     }
 
     /// Bytes whose last is on the wire at `at`.
@@ -513,8 +523,9 @@ impl Clocked for World {
         let number = self.number;
         self.number += 1;
         let call = self.call_of(slave, &pdu, is_stop)?;
-        let under_way = UnderWay { slave, pdu, end, number, call };
         let is_owed = |words: u8| self.owed.get(&(slave, words)).is_some_and(|until| self.now < *until);
+        let mut under_way = UnderWay { slave, pdu, end, number, call, behind_an_owed: false };
+        under_way.behind_an_owed = is_owed(under_way.read().1);
         self.has_no_own_length = LENGTHS.clone().all(is_owed);
         self.owed.insert(under_way.read(), end + MEMORY);
         self.under_way = Some(under_way);

@@ -182,7 +182,7 @@ async fn what_became_of_the_last_command_is_kept_whoever_gave_it_and_also_that_i
         target: drived_plant::plant::commands::Target::All,
         action: drived_plant::plant::commands::Action::Stop(drive_core::StopMode::Ramp.into()),
         expects: None,
-        lifetime: Duration::from_secs(1),
+        lifetime: LIFETIME,
         arrived: Instant::now(),
     };
     bench.plant.plant.begin(&caller, stop).expect("it is taken");
