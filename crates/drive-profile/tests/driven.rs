@@ -639,9 +639,31 @@ async fn a_stop_that_is_refused_ends_no_lease_whatever_state_the_drive_shows() {
             rig.machine.trip(9);
         }
         let error = rig.drive.stop(StopMode::Ramp).await.expect_err("it is refused, each time");
-        assert_eq!(error.kind(), ErrorKind::OutcomeUnknown, "{error}");
+        assert_eq!(error.kind(), ErrorKind::Exception, "{error}");
         assert!(rig.drive.lease().is_some(), "the run command may stand");
     }
+}
+
+/// While 0004 of an iG5A is 0 it refuses every write, a stop too (p. 11-3). Its twin refuses one to a register that it does not have.
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_a_drive_refuses_by_its_settings_says_by_which_and_is_written_on() {
+    let mut rig = misread("ls/ig5a", "ig5a", "address = 0x0006", "address = 0x0036");
+    rig.drive.status().await.expect("it answers");
+    rig.machine.written_by_another(4, 3_000).expect("30 Hz by the bus");
+    rig.machine.written_by_another(5, 2).expect("a run command");
+    rig.until_machine("it runs", |machine| machine.output_frequency == 3_000).await;
+    assert!(rig.machine.poke(3, 0));
+    let before = rig.machine.received().len();
+    for _ in 0..2 {
+        let error = rig.drive.stop(StopMode::Ramp).await.expect_err("it is refused, each time");
+        let (kind, told) = (error.kind(), error.to_string());
+        let cause = "its write enable lets a stop through (ENABLE reads 0): set ENABLE";
+        assert!(kind == ErrorKind::NotConfirmed && told.contains(cause), "{told}");
+    }
+    let received = rig.machine.received();
+    let stops: Vec<_> = received.iter().skip(before).map(|request| !is_read(request)).collect();
+    assert!(stops.first() == Some(&true), "nothing is read before it");
+    assert!(stops.iter().filter(|is_stop| **is_stop).count() >= 8, "{stops:?}");
 }
 
 /// It has tripped, and the one write of the stop gets an exception, or is lost: it is written until it is taken.

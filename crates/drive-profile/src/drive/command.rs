@@ -201,6 +201,10 @@ impl<P: Port> ProfileDrive<P> {
         // What the drive shows is no proof of a stop that it has refused or never got: behind a trip, or a state in which no motor turns,
         // the run command may stand and act when that goes away.
         let mut written = self.write_stop(action, order).await?;
+        // It has said of each write that nothing was done by it.
+        let denied =
+            |written: &Result<()>| written.as_ref().is_err_and(|error| error.kind() == ErrorKind::Exception);
+        let (mut is_denied, mut why_denied, mut is_asked) = (denied(&written), None, false);
         self.registers.owe_judgement();
         let mut confirming = Confirming::begin();
         let settled = Instant::now() + SETTLED_WITHIN;
@@ -246,7 +250,12 @@ impl<P: Port> ProfileDrive<P> {
             first = first.or(status.output_frequency);
             if Instant::now() >= again {
                 written = self.write_stop(action, order).await.map_err(Error::after_write)?;
+                is_denied &= denied(&written);
                 again = Instant::now() + SETTLED_WITHIN;
+            }
+            // Behind a write, and once: the next one is not due yet.
+            if is_denied && !std::mem::replace(&mut is_asked, true) {
+                why_denied = self.why_denied().await;
             }
             // One that somebody else commands does not obey however long that is waited for, and what it says is told. One that goes down to
             // a lower setpoint may not tell for as long as that takes whether it obeys: by half the time whoever waits hears that it does.
@@ -255,8 +264,12 @@ impl<P: Port> ProfileDrive<P> {
             let now = Instant::now();
             let is_told = because.is_some() && now >= settled || slows && now >= half;
             if is_told || !confirming.again().await {
-                written.map_err(Error::after_write)?;
-                return Err(self.not_confirmed(order, status, because));
+                let why_denied = why_denied.filter(|_| is_denied);
+                return Err(match written {
+                    Err(denied) if is_denied && why_denied.is_none() => denied,
+                    Err(error) if why_denied.is_none() => error.after_write(),
+                    _ => self.not_confirmed(order, status, why_denied.or(because)),
+                });
             }
         }
     }

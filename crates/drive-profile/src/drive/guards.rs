@@ -129,30 +129,48 @@ impl<P: Port> ProfileDrive<P> {
     }
 
     pub(super) async fn read_guards(&mut self, class: Class) -> Result<Words> {
+        let words = self.guard_words(class).await?;
+        (self.guarded.otherwise, self.guarded.setting) = self.found(&words);
+        if self.guarded.otherwise.is_none() {
+            (self.guarded.hold, self.guarded.have_held) = (true, true);
+        }
+        Ok(words)
+    }
+
+    async fn guard_words(&mut self, class: Class) -> Result<Words> {
         let profile = self.profile.clone();
         let mut words = Words::default();
         for block in profile.guards() {
             let read = self.read_block(class, block).await?;
             words.keep(block, read);
         }
-        let read = |guard: &Guard| profile.word(&words, guard.register.get_ref());
+        Ok(words)
+    }
+
+    /// What these words say otherwise, and which setting has to be made for it.
+    fn found(&self, words: &Words) -> (Option<&'static str>, Option<&'static str>) {
+        let profile = &self.profile;
+        let read = |guard: &Guard| profile.word(words, guard.register.get_ref());
         let fails = |guard: &&Guard| read(guard).is_none_or(|word| !holds(guard, word));
-        let scale = self.scale_is_otherwise(&words);
-        let found = all(&profile).find(fails).map(|guard| interned::text(&is_otherwise(guard, read(guard))));
-        self.guarded.otherwise = found.or(scale);
+        let scale = self.scale_is_otherwise(words);
+        let found = all(profile).find(fails).map(|guard| interned::text(&is_otherwise(guard, read(guard))));
         let guards = profile.file().who.guards.given().into_iter().flatten();
-        let failing = all(&profile).filter(|guard| fails(guard)).count();
+        let failing = all(profile).filter(|guard| fails(guard)).count();
         let mut unset = guards.map(crate::format::Spanned::get_ref).filter(fails);
         // A fingerprint that fails is no setting that anybody can make.
-        self.guarded.setting = (unset.clone().count() == failing)
+        let setting = (unset.clone().count() == failing)
             .then(|| {
                 unset.find_map(|guard| Some(interned::text(&is_to_be_set(guard, read(guard)?)))).or(scale)
             })
             .flatten();
-        if self.guarded.otherwise.is_none() {
-            (self.guarded.hold, self.guarded.have_held) = (true, true);
-        }
-        Ok(words)
+        (found.or(scale), setting)
+    }
+
+    /// What is found otherwise of a drive that has refused a stop, where it can be read. It is only told: no later stop is held back for it.
+    pub(super) async fn why_denied(&mut self) -> Option<Refusal> {
+        let words = self.guard_words(Class::Command).await.ok()?;
+        let (otherwise, setting) = self.found(&words);
+        otherwise.map(|otherwise| setting.map_or(Refusal::AnotherDrive(otherwise), Refusal::Settings))
     }
 
     /// That the drive holds another full scale than its owner has said.
