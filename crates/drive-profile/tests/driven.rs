@@ -995,3 +995,26 @@ async fn a_setpoint_that_only_reads_back_is_not_confirmed_while_the_motor_runs_o
         rig.until_machine("it follows", |machine| machine.output_frequency.abs_diff(2_000) < 10).await;
     }
 }
+
+/// Goodrive: 5 stops along the ramp, 6 lets coast, 1 and 2 run; V20 and G120: OFF1 is 047Eh, OFF3 047Ah, OFF2 047Ch, ON 047Fh. A GS4 tells 1 in one
+/// register for both directions, and its stop is 0 there; a WJ200 is stopped by a coil.
+#[tokio::test]
+async fn the_word_of_a_stop_by_another_master_is_known_as_one_and_no_other_word_is() {
+    use drive_core::Intent;
+    let rows = [
+        ("goodrive", 0x2000, 5, Some(StopMode::Ramp)),
+        ("goodrive", 0x2000, 6, Some(StopMode::Freewheel)),
+        ("goodrive", 0x2000, 1, None),
+        ("goodrive", 0x2000, 2, None),
+        ("goodrive", 0x2001, 5, None),
+        ("v20", 99, 0x047E, Some(StopMode::Ramp)),
+        ("v20", 99, 0x047A, Some(StopMode::Fast)),
+        ("v20", 99, 0x047C, Some(StopMode::Freewheel)),
+        ("v20", 99, 0x047F, None),
+        ("wj200", 0, 0, None),
+    ];
+    for (key, register, word, stop) in rows {
+        let intent = rig(key).drive.intent(register, word).await;
+        assert_eq!(intent.ok().flatten(), stop.map(Intent::Stop), "{key} {register:04X}h {word:04X}h");
+    }
+}

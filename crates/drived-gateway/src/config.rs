@@ -151,7 +151,7 @@ settings! {
     raw_writes: bool = "`false`", |to, said| to.raw_writes = *said;
     /// `true`: also parameters that go to an EEPROM, or of which the manual does not say where they go
     eeprom_writes: bool = "`false`", |to, said| to.eeprom_writes = *said;
-    /// `true`: a write to unit 0 that is a stop of any family stops all drives of this gateway, unless it is a start of another family,
+    /// `true`: a write to unit 0 that is a stop of any built-in family stops all drives of this gateway, unless it is a start of another family,
     /// and is confirmed when all have taken it;
     /// nothing else is carried out for unit 0
     broadcast: bool = "`false`", |to, said| to.broadcast = *said;

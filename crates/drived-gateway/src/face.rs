@@ -122,7 +122,9 @@ fn meaning(gateway: &GatewayConfig) -> Vec<(&'static str, String)> {
         gateway.reads
     );
     let writes = match gateway.rights {
-        Rights { operate: true, .. } => "commands, by the rules of motion, and stops ahead of everything",
+        Rights { operate: true, .. } => {
+            "commands, by the rules of motion, and stops ahead of everything; of drives by file stops alone"
+        }
         Rights { stop: true, .. } => "stops only",
         _ => "none: it only reads",
     };

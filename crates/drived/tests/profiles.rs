@@ -6,9 +6,11 @@ mod support;
 
 use std::{
     fs,
-    io::{BufRead as _, BufReader},
+    io::{BufRead as _, BufReader, Read as _, Write as _},
+    net::TcpStream,
     path::{Path, PathBuf},
     process::{Command, Stdio},
+    time::Duration,
 };
 
 use support::{Ended, File, Running, Sim, drived, free_port, path, python_with, run};
@@ -347,6 +349,46 @@ fn the_daemon_drives_it_keeps_to_the_profile_with_which_it_began_and_its_audit_l
         log.lines().find(|line| line.contains("driven by the profile own-drive")).expect("it stands there");
     let hex = connected.split("own-drive ").nth(1).and_then(|rest| rest.get(..64)).unwrap_or_default();
     assert!(hex.len() == 64 && hex.bytes().all(|byte| byte.is_ascii_hexdigit()), "{connected}");
+    let _ = fs::remove_dir_all(&state);
+}
+
+/// 5 in 2000h is the stop of a Goodrive, and 1 its start (p. "communication command"): a SCADA that writes the one stops the motor, ahead of all.
+#[test]
+fn the_stop_word_of_a_drive_from_a_file_stops_it_through_a_gateway_and_no_other_word_moves_it() {
+    let folder = Folder::new("gateway");
+    let state = path("gateway-profiles-state");
+    let sim = Sim::serve("profile-gateway", &["goodrive@3"]);
+    let port = free_port();
+    let gateway = format!(
+        "[[gateways]]\nlisten = \"127.0.0.1:{port}\"\nwrites = \"operate\"\nbroadcast = true\npatience = \"9s\"\n"
+    );
+    let file = File::new("profile-gateway", &(configuration(&folder.0, &state, sim.link()) + &gateway));
+    let checked = run(&["check", "--config", file.path()]);
+    assert!(checked.assert_done().contains("of drives by file stops alone"), "{}", checked.out);
+    let socket = path("profile-gateway.sock");
+    let socket = socket.to_str().expect("the path is text");
+    let mut daemon = Running::start(&["run", "--config", file.path(), "--socket", socket]);
+    daemon.wait_for(r#""event":"connected""#);
+    done(&run(&["start", "pump", "--setpoint", "20Hz", "--socket", socket]));
+    let mut scada = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
+    scada.set_read_timeout(Some(Duration::from_secs(60))).expect("a time-out can be set");
+    let mut write = |unit: u8, word: u8| {
+        scada.write_all(&[0, 1, 0, 0, 0, 6, unit, 6, 0x20, 0, 0, word]).expect("it takes it");
+        let mut answer = [0; 9];
+        scada.read_exact(&mut answer).expect("each request gets an answer");
+        if answer[7] == 6 {
+            scada.read_exact(&mut [0; 3]).expect("the echo is whole");
+        }
+        answer[7]
+    };
+    // A start, another drive's words for all, and the stop of its own.
+    assert_eq!([write(3, 2), write(0, 5)], [0x86, 0x86], "refused");
+    assert!(run(&["status", "pump", "--socket", socket]).assert_done().contains("running"));
+    assert_eq!(write(3, 5), 6, "the stop is taken");
+    assert!(!run(&["status", "pump", "--socket", socket]).assert_done().contains("running"));
+    run(&["stop", "pump", "--socket", socket]).assert_done();
+    let (code, last) = daemon.interrupt();
+    assert_eq!(code, Some(0), "{last}");
     let _ = fs::remove_dir_all(&state);
 }
 

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use drive_core::{
-    Class, Command, Direction, Drive, Error, Faults, Ground, Identity, Lease, Measurements, Port, Recognised,
-    Refusal, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability, Withdrawn,
-    Written, async_trait, registers::refuse_commands,
+    Class, Command, Direction, Drive, Error, Faults, Ground, Identity, Intent, Lease, Measurements, Port,
+    Recognised, Refusal, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability,
+    Withdrawn, Written, async_trait, registers::refuse_commands,
 };
 
 use super::ProfileDrive;
@@ -148,6 +148,14 @@ impl<P: Port> Drive for ProfileDrive<P> {
     async fn keep_alive(&mut self) -> Result<()> {
         let Some(block) = self.sight.fast.first().copied() else { return Ok(()) };
         self.read_block(Class::KeepAlive, block).await.map(drop)
+    }
+
+    /// Its stops alone, each by the one word that its profile writes for it: what other words do to the motor the profile does not say.
+    async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
+        match self.profile.stopped_by(register, word) {
+            Some(mode) => Ok(Some(Intent::Stop(mode))),
+            None => Intent::kept(),
+        }
     }
 
     async fn read_parameter(&mut self, row: &'static Row) -> Result<u16> {

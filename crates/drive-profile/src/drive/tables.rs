@@ -4,13 +4,14 @@ use std::time::Duration;
 
 use drive_core::{
     Capabilities, FaultEntry, Quantity, Row, SerialSettings, StopMode, interned,
-    registers::{Access, Choice, Confidence, Factory, Form, Place, Range, Storage, Unit},
+    registers::{Access, Choice, Confidence, Factory, Form, Place, Range, Space, Storage, Unit},
     serial::CharacterFormat,
 };
 
 use crate::{
-    format::{self, Byte, ModeName, Register, UnitName},
-    profile::Profile,
+    format::{self, Action, Byte, ModeName, Register, UnitName},
+    ladder::Level,
+    profile::{Profile, Written},
 };
 
 /// The speeds that are let of a drive whose own are not known: who has it knows them.
@@ -116,6 +117,16 @@ impl Profile {
     pub(crate) fn stop_modes(&self) -> Vec<StopMode> {
         let has = |(name, mode): &(ModeName, StopMode)| self.file.stop.of(*name).given().map(|_| *mode);
         MODES.iter().filter_map(has).collect()
+    }
+
+    /// The stop that is this word in this register, and nothing else.
+    pub(crate) fn stopped_by(&self, register: u16, word: u16) -> Option<StopMode> {
+        let written = [Written { space: Space::HoldingRegister, address: register, value: word }];
+        let is_it = |stop: &Action| self.file.writes(stop) == written;
+        let has = |(name, mode): &(ModeName, StopMode)| {
+            self.file.stop.of(*name).given().filter(|stop| is_it(stop.get_ref())).map(|_| *mode)
+        };
+        MODES.iter().find_map(has).filter(|_| self.keeps_from(Level::Stop).is_none())
     }
 
     fn setpoint_unit(&self) -> Option<UnitName> {

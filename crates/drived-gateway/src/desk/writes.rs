@@ -150,7 +150,11 @@ impl Desk {
 
     /// Whether the words of a broadcast stop the drives of this gateway.
     fn broadcast_stop(&self, ask: &Ask) -> Option<Stop> {
-        let drives = self.drives();
+        // What a word of one drive by file asks of another nothing tells: it may be a start there.
+        let is_built_in = |drive: &DriveHandle| {
+            Family::BUILT_IN.iter().any(|family| family.capabilities().key == drive.capabilities().key)
+        };
+        let drives: Vec<_> = self.drives().into_iter().filter(is_built_in).collect();
         let intents = drives.iter().flat_map(|drive| self.intents_without_reading(drive, ask));
         stop_of_all(intents).map(Stop)
     }
