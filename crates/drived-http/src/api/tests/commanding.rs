@@ -79,7 +79,7 @@ async fn the_same_id_and_body_is_answered_and_not_repeated() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn an_id_with_another_body_or_of_another_caller_is_refused() {
+async fn an_id_with_another_body_is_refused_and_another_callers_is_his_own() {
     let plant = TestPlant::of(2).await;
     let body = json!({"id": "once", "setpoint": {"frequency_hz": 30.0}});
     assert_eq!(command(&plant.plant, RUN, &body).await.0, StatusCode::OK);
@@ -88,8 +88,15 @@ async fn an_id_with_another_body_or_of_another_caller_is_refused() {
     assert_eq!((status, &refused["reason"]), (StatusCode::CONFLICT, &"id_reused".into()), "{refused}");
     let (status, _) = command(&plant.plant, "/api/v1/drives/pump%202/start", &body).await;
     assert_eq!((status, is_running(&plant, 1)), (StatusCode::CONFLICT, false));
-    let (status, _) = send(api(&plant.plant, "somebody else", ALL), post(RUN, &body)).await;
-    assert_eq!(status, StatusCode::CONFLICT);
+    // Two that count their commands alike: each is answered for his own, and by the id alone neither is.
+    assert_eq!(get(&plant.plant, "/api/v1/commands/once").await.0, StatusCode::OK);
+    for _ in 0..2 {
+        let (status, his) = send(api(&plant.plant, "somebody else", ALL), post(RUN, &other)).await;
+        assert_eq!((status, &his["caller"]), (StatusCode::OK, &"somebody else".into()), "{his}");
+    }
+    let (status, again) = command(&plant.plant, RUN, &body).await;
+    assert_eq!((status, again["caller"] != "somebody else"), (StatusCode::OK, true), "{again}");
+    assert_eq!(get(&plant.plant, "/api/v1/commands/once").await.0, StatusCode::NOT_FOUND);
 }
 
 #[tokio::test(start_paused = true)]

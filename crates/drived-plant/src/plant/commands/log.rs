@@ -1,4 +1,4 @@
-//! What became of the last commands, by their ids: a command that comes again is answered, not repeated.
+//! What became of the last commands, by their ids: a command that comes again is answered, not repeated. An id is its caller's own.
 
 use std::{
     collections::{HashMap, VecDeque},
@@ -28,7 +28,8 @@ pub(in crate::plant) struct Log(Mutex<Entries>);
 
 #[derive(Default)]
 struct Entries {
-    by_id: HashMap<String, Entry>,
+    /// Those that have an id in common are of as many callers.
+    by_id: HashMap<String, Vec<Entry>>,
     /// The ids with the time of their arrival, the oldest first. One that was used again stands here more than once.
     order: VecDeque<(Instant, String)>,
 }
@@ -52,11 +53,14 @@ pub(super) enum Found {
 }
 
 impl Log {
-    /// The command of an id.
+    /// The command of an id; of one that several callers have used none is told: it would be another's.
     pub(super) fn of(&self, id: &str) -> Option<Command> {
         let mut entries = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         entries.forget(Instant::now());
-        entries.by_id.get(id).map(|entry| Arc::clone(&entry.command))
+        match &entries.by_id.get(id)?[..] {
+            [only] => Some(Arc::clone(&only.command)),
+            _ => None,
+        }
     }
 
     /// The same command of the same caller as it came before, or a new one. A stop is always new.
@@ -76,7 +80,9 @@ impl Log {
         let command = Arc::new(watch::Sender::new(Arc::new(view)));
         let (caller, told) = (caller.name.clone(), Arc::clone(&command));
         let entry = Entry { arrived, caller, target, action, expects, lifetime, command: told };
-        entries.by_id.insert(id.clone(), entry);
+        let same = entries.by_id.entry(id.clone()).or_default();
+        same.retain(|other| other.caller != entry.caller);
+        same.push(entry);
         entries.order.push_back((arrived, id));
         Ok(Found::New(command))
     }
@@ -98,7 +104,7 @@ impl Log {
             }
             _ => None,
         };
-        entries.by_id.values().filter_map(given).collect()
+        entries.by_id.values().flatten().filter_map(given).collect()
     }
 }
 
@@ -114,10 +120,10 @@ impl Entries {
     fn again(&self, caller: &Caller, request: &Request) -> Result<Option<Command>, Rejected> {
         let is_once = !matches!(request.action, Action::Stop(_));
         let id = request.id.as_ref().filter(|_| drive_fleet::mutant!("done-twice", is_once, false));
-        let Some((id, entry)) = id.and_then(|id| self.by_id.get_key_value(id)) else { return Ok(None) };
-        let is_same = entry.caller == caller.name
-            && (&entry.target, entry.action, &entry.expects, entry.lifetime)
-                == (&request.target, request.action, &request.expects, request.lifetime);
+        let Some((id, same)) = id.and_then(|id| self.by_id.get_key_value(id)) else { return Ok(None) };
+        let Some(entry) = same.iter().find(|entry| entry.caller == caller.name) else { return Ok(None) };
+        let is_same = (&entry.target, entry.action, &entry.expects, entry.lifetime)
+            == (&request.target, request.action, &request.expects, request.lifetime);
         if is_same { Ok(Some(Arc::clone(&entry.command))) } else { Err(Rejected::IdReused(id.clone())) }
     }
 
@@ -129,8 +135,11 @@ impl Entries {
                 return;
             }
             let Some((arrived, id)) = self.order.pop_front() else { return };
-            if self.by_id.get(&id).is_some_and(|entry| entry.arrived == arrived) {
-                self.by_id.remove(&id);
+            if let Some(same) = self.by_id.get_mut(&id) {
+                same.retain(|entry| entry.arrived != arrived);
+                if same.is_empty() {
+                    self.by_id.remove(&id);
+                }
             }
         }
     }
