@@ -5,6 +5,9 @@ use drive_core::{Capabilities, Identity};
 use drive_families::Family;
 use serde_json::{Value, json};
 
+/// Read device identification.
+const IDENTIFICATION: u8 = 0x2B;
+
 /// What is at an address.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Answer {
@@ -48,6 +51,15 @@ impl Likeness {
         let parts: Vec<String> =
             [names.join(" ")].into_iter().filter(|names| !names.is_empty()).chain(rating).collect();
         (!parts.is_empty()).then(|| parts.join(", "))
+    }
+
+    /// What speaks against it: that it has not said its name, by which the drives of this family are known.
+    pub(super) fn doubt(&self) -> Option<String> {
+        let tells = self.family.capabilities().functions.contains(&IDENTIFICATION);
+        let model = self.identity.as_ref().and_then(|identity| identity.model.as_ref());
+        (tells && !self.certain && model.is_none()).then(|| {
+            format!("it does not say its name (function 43/14), as each {} does by its manual", self.family)
+        })
     }
 
     fn object(&self) -> Value {
@@ -133,21 +145,26 @@ pub(super) fn described(alike: &[Likeness]) -> String {
     };
     match alike {
         [] => {
-            // Nothing is found out by writing: what reads like others' drives is not guessed.
-            let mute = Family::all().into_iter().filter(|family| !family.tells_itself());
-            let mute: Vec<String> = mute.map(|family| family.to_string()).collect();
-            let mute = match &mute[..] {
-                [] => String::new(),
-                mute => format!(", unless one of those that nothing tells from others: {}", mute.join(", ")),
-            };
+            let mute = mute().map_or_else(String::new, |mute| format!(", unless {mute}"));
             format!("a Modbus slave, and no drive of a family that is known here{mute}")
         }
         [only] if only.certain => format!("{}, by its own words", one(only)),
         _ => {
             let families: Vec<String> = alike.iter().map(one).collect();
-            format!("likely {}, by its registers", families.join(" or "))
+            let doubt = alike.iter().find_map(Likeness::doubt).map_or_else(String::new, |doubt| {
+                let mute = mute().map_or_else(String::new, |mute| format!(", or {mute}"));
+                format!("; {doubt}: it may be a drive that is not known here{mute}")
+            });
+            format!("likely {}, by its registers{doubt}", families.join(" or "))
         }
     }
+}
+
+/// The families whose drives are not guessed: nothing is found out by writing, and they read like others'.
+fn mute() -> Option<String> {
+    let mute = Family::all().into_iter().filter(|family| !family.tells_itself());
+    let mute: Vec<String> = mute.map(|family| family.to_string()).collect();
+    (!mute.is_empty()).then(|| format!("one of those that nothing tells from others: {}", mute.join(", ")))
 }
 
 #[cfg(test)]

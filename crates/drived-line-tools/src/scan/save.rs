@@ -106,7 +106,7 @@ fn text(name: &str, finds: &Finds) -> String {
 }
 
 /// A line and its drives.
-fn section(name: &str, line: &str, finds: &[(SlaveAddress, &Answer)]) -> String {
+pub(super) fn section(name: &str, line: &str, finds: &[(SlaveAddress, &Answer)]) -> String {
     let (name, port) = (quoted(name), quoted(line));
     let mut text = format!("\n[lines.{name}]\nport = {port}\n");
     for (slave, answer) in finds {
@@ -125,14 +125,15 @@ fn section(name: &str, line: &str, finds: &[(SlaveAddress, &Answer)]) -> String 
 
 fn drive(line: &str, slave: SlaveAddress, first: &Likeness, others: &[Likeness]) -> String {
     let says = first.says().map(|says| format!(" It says it is {}.", escaped(&says))).unwrap_or_default();
+    let doubt = first.doubt().map_or_else(String::new, |doubt| format!(", and {doubt}"));
     let certainty = if first.certain {
         format!("# By its own words.{says}")
     } else if others.is_empty() {
-        format!("# A GUESS by its registers: see its nameplate.{says}")
+        format!("# A GUESS by its registers{doubt}: see its nameplate.{says}")
     } else {
         let others: Vec<String> = others.iter().map(|other| other.family.to_string()).collect();
         format!(
-            "# A GUESS by its registers, it could be {} too: see its nameplate.{says}",
+            "# A GUESS by its registers, it could be {} too{doubt}: see its nameplate.{says}",
             others.join(" or ")
         )
     };

@@ -50,6 +50,22 @@ async fn bytes_before_each_answer_are_no_second_drive() {
     }
 }
 
+/// "Read Device Identification" is a function of each ATV 312: an older Altivar has the same words, and refuses that one (01h).
+#[tokio::test(start_paused = true)]
+async fn of_a_drive_that_refuses_to_say_its_name_it_is_said_that_it_may_be_another() {
+    let finds = through(|_, said| {
+        if said.get(1) == Some(&0x2B) {
+            *said = vec![5, 0xAB, 0x01, 0xDF, 0x31];
+        }
+    });
+    let [Find { answer, step, .. }] = &finds.await[..] else { panic!("one answers") };
+    let told = answer.words();
+    let doubt = "it does not say its name (function 43/14), as each atv312 does by its manual";
+    assert!(told.starts_with("likely atv312") && told.contains(doubt), "{told}");
+    let kept = crate::scan::save::section("bench", "/dev/ttyS0", &[(step.slave, answer)]);
+    assert!(kept.contains("# A GUESS") && kept.contains(doubt), "{kept}");
+}
+
 #[tokio::test(start_paused = true)]
 async fn bytes_behind_each_answer_are_no_second_drive() {
     let worlds: [(&str, Change); 4] = [
