@@ -483,6 +483,21 @@ async fn a_stop_along_the_ramp_ends_at_rest_and_one_that_cuts_the_output_does_no
     }
 }
 
+/// A WJ200 and a VF-S15 run until their motor stands: what comes down by a word that was taken back does so along the ramp.
+#[tokio::test(start_paused = true)]
+async fn a_motor_whose_run_command_was_taken_back_is_told_at_rest_once_it_has_come_down() {
+    for key in DRIVEN {
+        let mut rig = running(key).await;
+        rig.drive.withdraw().await.unwrap_or_else(|error| panic!("{key}: {error}"));
+        rig.poll_for(Duration::from_millis(500)).await;
+        let start =
+            rig.drive.start(Direction::Forward).await.expect_err("it may run by another's word by now");
+        assert_eq!(start.kind(), ErrorKind::Refused, "{key}: {start}");
+        let end = rig.until_standstill().await.motion;
+        assert_eq!(end, Motion::AtRest, "{key}");
+    }
+}
+
 /// A V20 tells that it operates until its motor stands, on a ramp of 3 s.
 #[tokio::test(start_paused = true)]
 async fn a_stop_that_is_taken_is_told_of_a_motor_that_comes_down_whatever_its_drive_calls_that() {

@@ -60,7 +60,8 @@ impl<P: Port> ProfileDrive<P> {
         self.guard(order).await?;
         let local = self.commanded_by_other(&words);
         let was_fed = matches!(status.state, State::Running | State::Stopping);
-        let runs = was_fed && self.comes_down.is_none();
+        // One whose run command was taken back may have another's by now: it is not started before it stands.
+        let runs = was_fed && (self.comes_down.is_none() || self.withdrawn_at.is_some());
         let others = (runs && self.watch.run.lease().is_none()).then_some(NOT_OURS);
         match status.bars_motion().or(local).or(others) {
             Some(reason) => Err(self.refused(order, reason)),
@@ -201,6 +202,7 @@ impl<P: Port> ProfileDrive<P> {
         // What the drive shows is no proof of a stop that it has refused or never got: behind a trip, or a state in which no motor turns,
         // the run command may stand and act when that goes away.
         let mut written = self.write_stop(action, order).await?;
+        self.withdrawn_at = None;
         // It has said of each write that nothing was done by it.
         let denied =
             |written: &Result<()>| written.as_ref().is_err_and(|error| error.kind() == ErrorKind::Exception);
@@ -320,6 +322,8 @@ impl<P: Port> ProfileDrive<P> {
             return Err(Error::Unsupported { what: "a withdrawal", reason: "its profile has no stop" });
         };
         self.has_ended = true;
+        self.lets_coast |= mode == StopMode::Freewheel;
+        self.watch.shaft.is_stopped_by(mode);
         self.step(step.get_ref(), Class::Command, Order::Withdraw).await?;
         self.registers.owe_judgement();
         let mut confirming = Confirming::begin();
@@ -344,6 +348,9 @@ impl<P: Port> ProfileDrive<P> {
             let stands = !matches!(status.state, State::Running | State::Unknown);
             if is_gone.unwrap_or_else(|| !is_others && (stands || comes_down(&status, first))) {
                 self.watch.run.end();
+                // It is not waited for that the output goes down: what goes down below this does so by the withdrawal.
+                self.withdrawn_at =
+                    status.output_frequency.filter(|_| status.state == State::Running && !is_others);
                 return Ok(Withdrawn::Ended(Status { verdict: None, ..status }));
             }
             first = first.or(status.output_frequency);

@@ -42,7 +42,8 @@ impl<P: Port> Drive for ProfileDrive<P> {
     fn forget(&mut self) {
         self.watch.lose_sight();
         self.forget_guards();
-        (self.comes_down, self.kept, self.at_speed) = (None, None, false);
+        (self.comes_down, self.withdrawn_at) = (None, None);
+        (self.kept, self.at_speed) = (None, false);
         (self.watchdog_time, self.changed) = (None, None);
         self.steady.forget();
     }

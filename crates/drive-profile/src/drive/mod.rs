@@ -17,7 +17,8 @@ mod watchdog;
 use std::sync::Arc;
 
 use drive_core::{
-    Error, ExceptionMeaning, Ground, Port, Refusal, Registers, SlaveAddress, Status, Watch, interned,
+    Error, ExceptionMeaning, Frequency, Ground, Port, Refusal, Registers, SlaveAddress, Status, Watch,
+    interned,
 };
 
 pub use owner::Owner;
@@ -55,6 +56,8 @@ pub struct ProfileDrive<P> {
     lets_coast: bool,
     /// A stop of this side was seen, and the motor may still come down by it: its output then, where it is told.
     comes_down: Option<Option<u32>>,
+    /// A run command of this side was taken back, while the output was this: until the drive is seen not to run.
+    withdrawn_at: Option<Frequency>,
     /// The last status told that the motor was at its speed.
     at_speed: bool,
     /// That the drive does not let its motor reach the setpoint that was given, as it was read last.
@@ -87,6 +90,7 @@ impl<P: Port> ProfileDrive<P> {
             has_ended: false,
             lets_coast: false,
             comes_down: None,
+            withdrawn_at: None,
             at_speed: false,
             limited: None,
             watchdog_time: None,

@@ -9,6 +9,7 @@ use tokio::time::Instant;
 use super::{
     ProfileDrive, Words,
     cell::Cell,
+    command::has_fallen,
     plan::Block,
     sight::{FullScale, Test},
 };
@@ -146,6 +147,12 @@ impl<P: Port> ProfileDrive<P> {
     /// Some drives tell that they run until the motor stands: behind a stop of this side, and as long as the output only goes down and does
     /// not stay where the setpoint is, it is stopping. Of one that tells no output it is until it is at its speed again.
     fn coming_down(&mut self, state: State, output: Option<Frequency>) -> State {
+        self.withdrawn_at = self.withdrawn_at.filter(|_| state == State::Running);
+        if self.comes_down.is_none() && output.is_some_and(|output| has_fallen(output, self.withdrawn_at)) {
+            // One that holds a lower speed by somebody else does not come down any more.
+            let from = std::mem::replace(&mut self.withdrawn_at, output);
+            self.comes_down = Some(from.map(Frequency::centihertz));
+        }
         let output = output.map(Frequency::centihertz);
         let is_down = match (state, self.comes_down, output) {
             (State::Running, Some(Some(last)), Some(output)) => {
