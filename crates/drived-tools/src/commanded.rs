@@ -295,9 +295,13 @@ impl Commanded {
                             }
                             News::Taken => {
                                 self.tell_what_it_took().await;
-                                self.say(format_args!(
-                                    "{name} is stopping ({} stop): the drive shows {status}", pending.mode
-                                ));
+                                // One that has tripped drives nothing, and does no stop by any mode.
+                                match status.is_fault() {
+                                    true => self.say(format_args!("{name} has taken the stop: the drive shows {status}")),
+                                    false => self.say(format_args!(
+                                        "{name} is stopping ({} stop): the drive shows {status}", pending.mode
+                                    )),
+                                }
                             }
                         }
                     }

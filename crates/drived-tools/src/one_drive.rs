@@ -150,11 +150,13 @@ impl OneDriveArgs {
     /// The same for a stop, with how it was asked for and how the drive has stopped.
     pub fn say_stopped(&self, one: &Commanded, stop: &Stop) -> Result<(), Failure> {
         let (name, Stop { modes, status, restarts }) = (one.name, stop);
-        let by = if modes.is_told() { format!(", {modes}") } else { String::new() };
+        // One that has tripped does no stop by any mode.
+        let is_told = modes.is_told() && !status.is_fault();
+        let by = if is_told { format!(", {modes}") } else { String::new() };
         let mut body = json!({
             "drive": name.to_string(), "action": "stop", "outcome": "confirmed", "stop": StopModesView::from(*modes), "status": status,
         });
-        if modes.is_told() {
+        if is_told {
             body["text"] = json!(modes.to_string());
         }
         let mut behind = String::new();

@@ -21,6 +21,8 @@ struct Object<'a> {
     cut_short: Option<&'a str>,
     verdicts: Vec<VerdictObject<'a>>,
     slaves: Vec<SlaveObject>,
+    /// The drives that stand tripped, which is no fault of the line.
+    tripped: Vec<String>,
     /// What nobody can know of the drives that are named.
     not_known: Vec<String>,
     listened_ms: u64,
@@ -96,6 +98,7 @@ pub(super) fn of(diagnosis: &Diagnosis<'_>) -> String {
         cut_short: seen.cut_short.as_deref(),
         verdicts: diagnosis.verdicts.iter().map(verdict).collect(),
         slaves: diagnosis.figures().into_iter().map(slave).collect(),
+        tripped: diagnosis.tripped(),
         not_known: diagnosis.not_known(),
         listened_ms: milliseconds(seen.listened.time),
         frames_of_others: seen.listened.frames().count(),

@@ -27,6 +27,8 @@ pub(super) struct Observations {
     pub(super) asked: Vec<Asked>,
     /// The words of the settings by which drives wait before they answer.
     pub(super) own_waits: Vec<(u8, u16)>,
+    /// The drives that stood tripped, by their last status.
+    pub(super) tripped: BTreeSet<u8>,
     /// Slaves whose answers came after the time of their question, how often.
     pub(super) overdue: Vec<(u8, u64)>,
     /// Whether a question could not be sent because the line was never quiet.

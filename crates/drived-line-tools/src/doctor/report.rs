@@ -77,10 +77,23 @@ impl Diagnosis<'_> {
         if self.verdicts.is_empty() {
             lines.push(self.healthy());
         }
+        let tripped = self.tripped();
+        if !tripped.is_empty() {
+            let stand = if tripped.len() == 1 { "stands" } else { "stand" };
+            lines.push(format!(
+                "{} {stand} TRIPPED, whatever the line does: see faults, and reset what may be",
+                tripped.join(", ")
+            ));
+        }
         if let Some(why) = &self.seen.cut_short {
             lines.push(format!("judged from the first {}: {why}", output::bound(self.seen.took)));
         }
         lines
+    }
+
+    /// The drives that stand tripped.
+    pub(super) fn tripped(&self) -> Vec<String> {
+        self.seen.tripped.iter().map(|slave| self.seen.name(*slave)).collect()
     }
 
     fn healthy(&self) -> String {

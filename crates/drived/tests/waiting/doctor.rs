@@ -5,11 +5,26 @@ use serde_json::Value;
 
 #[test]
 fn a_healthy_line_is_0_and_a_missing_drive_is_1_with_a_report_that_names_it() {
-    let sim = Sim::serve("doctor", &["atv312@1-2"]);
+    let mut sim = Sim::serve("doctor", &["atv312@1-2"]);
     let healthy = sim.on("atv312@1-2", &["doctor", "--for", "1s", "--json"]);
     let body: Value = serde_json::from_str(healthy.assert_done()).unwrap();
     assert_eq!((&body["healthy"], &body["verdicts"]), (&Value::Bool(true), &Value::Array(Vec::new())));
     assert_eq!(body["slaves"].as_array().map(Vec::len), Some(2), "{body}");
+
+    assert_eq!(body["tripped"], Value::Array(Vec::new()), "{body}");
+
+    // What is wrong with a drive and not with its line is told as that.
+    sim.say("atv312@2 trip SLF", "done");
+    let tripped = sim.on("atv312@1-2", &["doctor", "--for", "1s"]);
+    assert!(tripped.assert_done().contains("atv312@2 stands TRIPPED"), "{tripped:?}");
+    // It does nothing that could be called a stop by a mode.
+    let stop = sim.on("atv312@2", &["stop"]);
+    let told = stop.assert_done();
+    assert!(
+        told.contains("atv312@2 has taken the stop: the drive shows") && told.contains("fault"),
+        "{told}"
+    );
+    assert!(!told.contains("is stopping") && !told.contains("asked for a ramp stop"), "{told}");
 
     let report = path("report.txt");
     let file = report.to_str().unwrap();

@@ -56,6 +56,7 @@ pub(super) struct Asking {
     pub(super) ended: Option<Duration>,
     pub(super) answered: BTreeMap<u8, Duration>,
     pub(super) running: Option<BTreeSet<u8>>,
+    pub(super) tripped: BTreeSet<u8>,
     pub(super) foreign: u64,
     /// Questions after a short pause, which differ from each other.
     pub(super) short: u16,
@@ -107,6 +108,7 @@ impl Asking {
             ended: None,
             answered: BTreeMap::new(),
             running: None,
+            tripped: BTreeSet::new(),
             foreign: 0,
             short: 0,
             chance: Chance::default(),
@@ -271,6 +273,12 @@ impl Asking {
         self.note(asker, strays, false);
         match status {
             Ok(status) => {
+                let is_tripped = status.is_fault();
+                if is_tripped {
+                    self.tripped.insert(asker.slave)
+                } else {
+                    self.tripped.remove(&asker.slave)
+                };
                 let runs = !status.is_undriven();
                 let running = self.running.get_or_insert_default();
                 if runs {
@@ -341,6 +349,7 @@ impl Asking {
         seen.findings = self.line.findings();
         seen.asked = self.asked;
         seen.own_waits = self.own_waits;
+        seen.tripped = self.tripped;
         seen.never_quiet = self.never_quiet;
     }
 }

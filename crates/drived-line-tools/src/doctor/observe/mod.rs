@@ -5,7 +5,7 @@ mod chance;
 mod noting;
 mod terms;
 
-use std::{pin::pin, time::Duration};
+use std::{collections::BTreeSet, pin::pin, time::Duration};
 
 use drive_bus::{Line, LineConfig, listen::Listener};
 use drive_core::{
@@ -86,6 +86,7 @@ pub(super) async fn observe(
         elsewhere: Vec::new(),
         asked: Vec::new(),
         own_waits: Vec::new(),
+        tripped: BTreeSet::new(),
         overdue: Vec::new(),
         never_quiet: false,
         findings: Vec::new(),
