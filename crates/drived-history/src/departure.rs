@@ -71,7 +71,7 @@ mod tests {
     use drive_fleet::Until;
     use drived_config::rights::{Caller, Rights};
     use drived_plant::plant::{
-        commands::{Action, Request, Target},
+        commands::{Action, LIFETIME, Request, Target},
         testing::TestPlant,
     };
 
@@ -81,7 +81,7 @@ mod tests {
     async fn an_output_that_leaves_its_setpoint_is_told_once_and_one_that_was_given_another_is_not() {
         let test = TestPlant::of(1).await;
         let hertz = Frequency::from_hertz;
-        let (lifetime, arrived) = (Duration::from_secs(1), Instant::now());
+        let (lifetime, arrived) = (LIFETIME, Instant::now());
         let action = Action::Start {
             direction: Direction::Forward,
             setpoint: Some(hertz(30).into()),

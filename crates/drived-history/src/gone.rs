@@ -107,7 +107,7 @@ impl Gone {
 mod tests {
     use drived_config::rights::{Caller, Rights};
     use drived_plant::plant::{
-        commands::{Action, Request, Target},
+        commands::{Action, LIFETIME, Request, Target},
         testing::TestPlant,
     };
     use std::sync::Arc;
@@ -127,14 +127,8 @@ mod tests {
             until: Until::default(),
         };
         let target = Target::Drive("pump 1".to_owned());
-        let request = Request {
-            id: None,
-            target,
-            action,
-            expects: None,
-            lifetime: Duration::from_secs(1),
-            arrived: Instant::now(),
-        };
+        let request =
+            Request { id: None, target, action, expects: None, lifetime: LIFETIME, arrived: Instant::now() };
         let caller = Caller::new("operator", "page", Rights::ALL);
         let _ = test.plant.command(&caller, request, Duration::from_secs(10)).await;
         let drive = test.plant.fleet().drive("pump 1").unwrap();

@@ -155,7 +155,7 @@ mod tests {
         sleep(super::BEAT * 8).await;
         // As a process that is stopped: no timer of it runs meanwhile.
         advance(Duration::from_secs(2)).await;
-        let told = test.plant.command(&caller, start(), LIFETIME).await.unwrap();
+        let told = test.plant.command(&caller, start(), LIFETIME.time()).await.unwrap();
         assert_eq!(told.outcome, OutcomeWord::Expired, "{told:?}");
         sleep(Duration::from_secs(2)).await;
         advance(Duration::from_secs(2)).await;
@@ -163,7 +163,7 @@ mod tests {
         assert!(matches!(test.plant.begin(&caller, start()), Err(Rejected::Stopped(_))));
         sleep(Duration::from_secs(20)).await;
         assert!(!test.machines[0].observe().running);
-        let told = test.plant.command(&caller, start(), LIFETIME).await.unwrap();
+        let told = test.plant.command(&caller, start(), LIFETIME.time()).await.unwrap();
         assert_ne!(told.outcome, OutcomeWord::Expired, "a moment later it is as ever: {told:?}");
     }
 }

@@ -21,7 +21,7 @@ use drived_config::{
     testing::Folder,
 };
 use drived_plant::plant::{
-    commands::{Action, Request, Target},
+    commands::{Action, LIFETIME, Request, Target},
     past::Certainty,
     testing::TestPlant,
 };
@@ -80,7 +80,7 @@ impl Night {
             Target::Group(_) => Vec::new(),
         };
         for drive in drives {
-            let (lifetime, arrived) = (Duration::from_secs(1), Instant::now());
+            let (lifetime, arrived) = (LIFETIME, Instant::now());
             let request =
                 Request { id: None, target: Target::Drive(drive), action, expects: None, lifetime, arrived };
             let _ = self.plant.plant.command(&caller, request, Duration::from_secs(10)).await;
