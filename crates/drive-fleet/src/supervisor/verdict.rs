@@ -31,9 +31,9 @@ impl Supervisor {
         match result {
             Ok(()) => self.setpoint_given(now, setpoint),
             Err(error) => {
-                // Where nothing was sent, the drive holds what it held.
-                use ErrorKind::{NotSent, Refused, Unsupported};
-                self.given.take_if(|_| !matches!(error.kind(), Refused | Unsupported | NotSent));
+                // Where nothing was sent, or nothing was done, the drive holds what it held.
+                use ErrorKind::{Exception, NotSent, Refused, Unsupported};
+                self.given.take_if(|_| !matches!(error.kind(), Refused | Unsupported | NotSent | Exception));
                 let is_start =
                     self.active.as_ref().is_some_and(|active| matches!(active.order, Order::Start { .. }));
                 match error.kind() {

@@ -91,6 +91,8 @@ fn a_setpoint_that_cannot_be_given_leaves_the_one_that_the_drive_holds() {
         Error::Setpoint { slave: slave(), setpoint: given, problem },
         // A 3G3EV whose n05 forbids reverse, asked to start so at another setpoint.
         Error::Refused { slave: slave(), command, reason: drive_core::Refusal::DirectionForbidden },
+        // An answer: it was not carried out.
+        not_now(8502),
     ] {
         let mut rig = Rig::ready();
         rig.order(setpoint(20));
