@@ -3,6 +3,7 @@
 
 use std::{
     net::IpAddr,
+    pin::pin,
     sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
     time::Duration,
 };
@@ -25,7 +26,7 @@ use tokio::{
     runtime::Handle,
     sync::watch,
     task::JoinSet,
-    time::{Instant, sleep, timeout},
+    time::{Instant, sleep, timeout, timeout_at},
 };
 use tower::ServiceExt as _;
 
@@ -58,6 +59,8 @@ const LOGIN_BODY: usize = 4 * 1024;
 /// How long whoever has brought a right token may take to say it, and whoever has not.
 const BODY_WITHIN: Duration = Duration::from_secs(10);
 const BODY_OF_NOBODY_WITHIN: Duration = Duration::from_secs(1);
+/// How long a stop may take to say how: whoever is cut off in the middle of it has asked for one.
+const STOP_WITHIN: Duration = Duration::from_millis(250);
 /// How long an answer may take to begin: the longest wait for a command, and 10 s.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(40);
 
@@ -312,7 +315,14 @@ impl Gate {
                 caller
             }
         };
+        // But one that says whom it means.
+        let stops_whatever_it_says = stops && !path.contains("/selected/");
         let read = async |limit: usize| {
+            if stops_whatever_it_says {
+                let came = what_comes(body, limit, STOP_WITHIN).await;
+                asking.is_whole();
+                return Ok(came);
+            }
             let is_known = *authority != Authority::Freely || peer.address().is_none();
             let body = read(body, limit, if is_known { BODY_WITHIN } else { BODY_OF_NOBODY_WITHIN }).await?;
             asking.is_whole();
@@ -729,6 +739,21 @@ where
         Ok(Err(_)) => Err(Refusal::new(StatusCode::BAD_REQUEST, "the request ended before its end")),
         Err(_) => Err(Refusal::new(StatusCode::REQUEST_TIMEOUT, "the request took too long")),
     }
+}
+
+/// What has come of a body within a time, as far as it may go.
+async fn what_comes<B>(body: B, limit: usize, within: Duration) -> Bytes
+where
+    B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
+{
+    let (mut body, mut came, until) = (pin!(body), Vec::new(), Instant::now() + within);
+    while came.len() < limit
+        && let Ok(Some(Ok(frame))) = timeout_at(until, body.frame()).await
+    {
+        let room = limit - came.len();
+        came.extend(frame.data_ref().into_iter().flatten().take(room));
+    }
+    came.into()
 }
 
 /// Who the caller is now, and his cookie.

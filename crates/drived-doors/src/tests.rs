@@ -382,11 +382,35 @@ async fn a_head_that_comes_too_slowly_ends_its_connection() {
 async fn a_body_that_comes_too_slowly_is_given_up() {
     let rig = Rig::new("slow-body");
     let mut slow = rig.connect();
-    let head = "POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 9\r\n\r\n";
+    // Whom it stops stands in it.
+    let head = "POST /api/v1/selected/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 9\r\n\r\n";
     slow.write_all(head.as_bytes()).await.unwrap();
     let mut answer = Vec::new();
     slow.read_to_end(&mut answer).await.unwrap();
     assert!(answer.starts_with(b"HTTP/1.1 408"), "{}", String::from_utf8_lossy(&answer));
+}
+
+/// A radio link that goes between two segments: the head of a browser's request and its body come in two.
+#[tokio::test(start_paused = true)]
+async fn a_stop_whose_body_does_not_come_to_its_end_is_a_stop() {
+    for (length, said, is_cut) in
+        [(9, "", false), (90, "{\"mode\":\"fre", false), (90, "{\"mode\":\"fre", true), (200_000, "{", false)]
+    {
+        let rig = Rig::new("cut-stop");
+        let mut stream = rig.connect();
+        let begun = Instant::now();
+        let request = format!(
+            "POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n\r\n{said}"
+        );
+        stream.write_all(request.as_bytes()).await.unwrap();
+        if is_cut {
+            stream.shutdown().await.unwrap();
+        }
+        let mut status = [0; 12];
+        stream.read_exact(&mut status).await.unwrap();
+        assert_eq!(&status, b"HTTP/1.1 200", "{length}, {said}");
+        assert!(begun.elapsed() < Duration::from_millis(300), "{:?}", begun.elapsed());
+    }
 }
 
 #[tokio::test(start_paused = true)]

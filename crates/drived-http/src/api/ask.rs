@@ -4,15 +4,14 @@ use std::{convert::Infallible, time::Duration};
 
 use axum::{
     Extension,
-    body::{Body, Bytes},
+    body::Bytes,
     extract::{FromRequest, FromRequestParts, Path, Query, Request},
     http::{StatusCode, header::CONTENT_TYPE, request::Parts},
 };
-use http_body_util::BodyExt as _;
 use serde::{Deserialize, de::DeserializeOwned};
-use tokio::time::{Instant, timeout_at};
+use tokio::time::Instant;
 
-use super::{LARGEST_BODY, problem::Problem};
+use super::problem::Problem;
 use drived_doors::Caller;
 use drived_plant::plant::commands::Said;
 use drived_words::duration::Time;
@@ -21,9 +20,6 @@ use drived_words::strict::body;
 /// How long an answer is waited for, unless it is said, and at the longest.
 const WAIT: Duration = Duration::from_secs(2);
 const LONGEST_WAIT: Duration = Duration::from_secs(30);
-
-/// How long the body of a stop is waited for: whoever is cut off in the middle of it has asked for a stop.
-const STOP_BODY: Duration = Duration::from_millis(250);
 
 /// Who asks.
 pub(super) struct By(pub(super) Caller);
@@ -135,44 +131,25 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Sent<T> {
     }
 }
 
-/// The body of a stop, which is one whatever it says, and also where it does not come to its end.
+/// The body of a stop, which is one whatever it says.
 pub(super) struct Stopping(pub(super) Said);
 
 impl<S: Send + Sync> FromRequest<S> for Stopping {
     type Rejection = Problem;
 
-    async fn from_request(request: Request, _: &S) -> Result<Self, Problem> {
-        is_json(&request)?;
-        let body = what_comes(request.into_body()).await;
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        let body = json(request, state).await?;
         Ok(Self(Said::stopping(&String::from_utf8_lossy(&body))))
     }
 }
 
-/// What has come of a body within its time, and no more than a body may have.
-async fn what_comes(mut body: Body) -> Vec<u8> {
-    let (mut came, until) = (Vec::new(), Instant::now() + STOP_BODY);
-    while came.len() < LARGEST_BODY
-        && let Ok(Some(Ok(frame))) = timeout_at(until, body.frame()).await
-    {
-        let room = LARGEST_BODY - came.len();
-        came.extend(frame.data_ref().into_iter().flatten().take(room));
-    }
-    came
-}
-
 /// What is sent as JSON.
-pub(super) async fn json<S: Send + Sync>(request: Request, state: &S) -> Result<Bytes, Problem> {
-    is_json(&request)?;
-    Ok(Bytes::from_request(request, state).await?)
-}
-
-/// A page of somebody else's site cannot say so without asking first.
-fn is_json(request: &Request) -> Result<(), Problem> {
+async fn json<S: Send + Sync>(request: Request, state: &S) -> Result<Bytes, Problem> {
     let kind = request.headers().get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok());
     let kind = kind.and_then(|kind| kind.split(';').next()).map(str::trim);
     if !kind.is_some_and(|kind| kind.eq_ignore_ascii_case("application/json")) {
         let detail = "expected the header Content-Type: application/json";
         return Err(Problem::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, detail));
     }
-    Ok(())
+    Ok(Bytes::from_request(request, state).await?)
 }

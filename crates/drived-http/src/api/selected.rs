@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, de::DeserializeOwned, de::Error as _};
 use serde_json::{Map, Value};
 
-use super::{ask::json, problem::Problem};
+use super::{ask::Stopping, problem::Problem};
 use drived_plant::plant::commands::Said;
 
 /// A body with the names of the drives that are meant.
@@ -36,8 +36,7 @@ impl<S: Send + Sync> FromRequest<S> for StoppingSelected {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
-        // Whom it stops stands in it: it is waited for.
-        let said = Said::stopping(&String::from_utf8_lossy(&json(request, state).await?));
+        let Stopping(said) = Stopping::from_request(request, state).await?;
         let drives = names(said.body.get("drives")).map_err(Problem::unprocessable)?;
         Ok(Self(drives, said))
     }

@@ -5,7 +5,6 @@ use std::time::Duration;
 use axum::http::Method;
 use drive_core::{Frequency, State};
 use drive_fleet::{Band, DriveSettings, FrequencyLimits};
-use futures_util::{StreamExt as _, stream};
 use serde_json::json;
 use tokio::time::{Instant, sleep, timeout};
 
@@ -566,30 +565,6 @@ async fn a_stop_stops_whatever_its_body_says() {
         let (status, told) = send(api(&plant.plant, "operator", ALL), stop).await;
         assert_eq!((status, &told["command"]), (StatusCode::OK, &"ramp stop".into()), "{body}: {told}");
         assert!(!is_running(&plant, 0), "{body}");
-    }
-}
-
-/// A radio link that goes between two segments: a browser's fetch has its headers and its body in two.
-#[tokio::test(start_paused = true)]
-async fn a_stop_whose_body_does_not_come_to_its_end_or_has_none_is_a_stop() {
-    let plant = TestPlant::of(1).await;
-    let started = [Ok::<_, std::io::Error>("{\"mode\": \"fre")];
-    let broken = [Ok("{\"mode\": \"freewheel\""), Err(std::io::Error::other("the link is gone"))];
-    let waits = || stream::pending::<Result<&'static str, std::io::Error>>();
-    let bodies = [
-        ("it hangs", Body::from_stream(waits())),
-        ("it hangs in the middle", Body::from_stream(stream::iter(started).chain(waits()))),
-        ("it breaks off", Body::from_stream(stream::iter(broken))),
-        ("it is larger than any", Body::from(vec![b' '; 1 << 20])),
-        ("it never ends", Body::from_stream(stream::repeat_with(|| Ok::<_, std::io::Error>("     ")))),
-    ];
-    for (which, body) in bodies {
-        let start = json!({"setpoint": {"frequency_hz": 30.0}});
-        assert_eq!(command(&plant.plant, RUN, &start).await.0, StatusCode::OK);
-        let stop = Request::post(format!("{STOP}?wait=20s")).header("content-type", "application/json");
-        let (status, told) = send(api(&plant.plant, "operator", ALL), stop.body(body).unwrap()).await;
-        assert_eq!((status, &told["command"]), (StatusCode::OK, &"ramp stop".into()), "{which}: {told}");
-        assert!(!is_running(&plant, 0), "{which}");
     }
 }
 
