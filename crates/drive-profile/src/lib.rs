@@ -33,6 +33,7 @@ mod scale;
 pub mod shipped;
 mod source;
 mod substance;
+mod written;
 
 #[cfg(feature = "schemars")]
 pub use format::schema;

@@ -14,8 +14,9 @@ use self::bits::Places;
 use crate::{
     drive::Words,
     format::{Access, Acts, Bits, Guard, Order, Register, Space, UnitName},
-    profile::{Profile, Written},
+    profile::Profile,
     scale::{counts, hundredths},
+    written::Written,
 };
 
 /// What 100 % is on a simulated drive that counts in percent: its owner is to say so.

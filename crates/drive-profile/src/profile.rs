@@ -7,6 +7,7 @@ use crate::{
     ladder::{Gap, Level},
     read_back::ReadBack,
     source::grade,
+    written::Written,
 };
 
 /// A profile that was checked. What its file holds is whole: each name that it uses is one of its own.
@@ -28,15 +29,6 @@ pub struct Profile {
     pub(crate) gaps: Vec<Gap>,
     pub(crate) digest: String,
     pub(crate) substance: String,
-}
-
-/// One register or coil of a write.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Written {
-    pub(crate) space: Space,
-    pub(crate) address: u16,
-    /// The word; 0 or 1 of a coil.
-    pub(crate) value: u16,
 }
 
 impl Profile {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::{
     format::{Answer, File, Space},
-    profile::Written,
+    written::Written,
 };
 
 /// The most places of which one word tells: a bit of each.

@@ -6,8 +6,9 @@ use drive_core::tokio_modbus::Request;
 
 use crate::{
     format::{Spanned, UnitName},
-    profile::{Profile, Written},
+    profile::Profile,
     scale::{counts, hundredths},
+    written::Written,
 };
 
 /// The function that writes registers and reads others in one exchange.

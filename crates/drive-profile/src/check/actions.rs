@@ -7,7 +7,7 @@ use crate::format::Spanned;
 use super::{Check, states::is_fault};
 use crate::{
     format::{Access, Action, File, Register, Sign, Space, Step, Storage},
-    profile::Written,
+    written::Written,
 };
 
 /// The most steps of an action.

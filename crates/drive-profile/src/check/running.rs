@@ -4,7 +4,7 @@
 use super::Check;
 use crate::{
     format::{Action, Answer, Bits, Owner, Spanned, StateName},
-    profile::Written,
+    written::Written,
 };
 
 impl Bits {

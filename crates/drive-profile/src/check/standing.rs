@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::Check;
 use crate::{
     format::{Action, Acts, Space, Spanned},
-    profile::Written,
+    written::Written,
 };
 
 /// What stands in the registers and coils of a drive.

@@ -164,7 +164,7 @@ impl Check<'_> {
                 }
                 let place = found.and_then(|register| self.file.place(register));
                 if let Some((space, address)) = place
-                    && self.file.runs(crate::profile::Written { space, address, value: word })
+                    && self.file.runs(crate::written::Written { space, address, value: word })
                 {
                     self.refuse(
                         &spanned.span(),

@@ -16,8 +16,9 @@ use super::{
 use crate::{
     format::{Action, Deed, Spanned, Step},
     ladder::Level,
-    profile::{Profile, Written},
+    profile::Profile,
     requests::READ_WRITE,
+    written::Written,
 };
 
 const NOT_OURS: Refusal = Refusal::Overridden {

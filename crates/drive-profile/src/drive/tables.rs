@@ -11,7 +11,8 @@ use drive_core::{
 use crate::{
     format::{self, Action, Byte, ModeName, Register, UnitName},
     ladder::Level,
-    profile::{Profile, Written},
+    profile::Profile,
+    written::Written,
 };
 
 /// The speeds that are let of a drive whose own are not known: who has it knows them.

@@ -2,7 +2,7 @@
 
 use drive_sim::Exception;
 
-use crate::{format::Space, profile::Written};
+use crate::{format::Space, written::Written};
 
 /// A drive by its places, whatever they are: coils, inputs, registers.
 pub(super) trait Places {
