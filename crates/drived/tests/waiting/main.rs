@@ -12,8 +12,6 @@ mod metrics;
 mod mistakes;
 #[path = "../support/page.rs"]
 mod page;
-#[cfg(target_os = "linux")]
-mod profile_faces;
 #[path = "../support/prometheus.rs"]
 mod prometheus;
 mod report;
@@ -22,6 +20,4 @@ mod rig;
 mod scan;
 #[path = "../support/mod.rs"]
 mod support;
-#[path = "../support/terminal.rs"]
-mod terminal;
 mod values;

@@ -1,4 +1,13 @@
 //! A drive from a file at every face: what it does not tell is told by none as a value, neither as zero nor as good; what is known is.
+#![cfg(target_os = "linux")]
+
+#[path = "support/page.rs"]
+mod page;
+#[path = "mqtt/rig.rs"]
+mod rig;
+mod support;
+#[path = "support/terminal.rs"]
+mod terminal;
 
 use std::{
     fs,
@@ -6,12 +15,12 @@ use std::{
     net::TcpStream,
 };
 
-use crate::support::{File, Running, Sim, drived, free_port, get, path, run};
-use crate::terminal::Terminal;
 use serde_json::Value;
+use support::{File, Running, Sim, drived, free_port, get, path, run};
+use terminal::Terminal;
 
 /// A WJ200 by a file of somebody who does not know where its output stands.
-const WJ200: &str = include_str!("../../../drive-profile/profiles/hitachi/wj200.toml");
+const WJ200: &str = include_str!("../../drive-profile/profiles/hitachi/wj200.toml");
 
 /// What a WJ200 does not tell.
 const OWNER: &str = "whether the drive tells who commands it is not known";
@@ -26,7 +35,7 @@ struct Row {
 
 #[test]
 fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_value() {
-    let broker = crate::rig::Mosquitto::start("profile-faces");
+    let broker = rig::Mosquitto::start("profile-faces");
     let mut ear = broker.as_ref().map(|broker| broker.hear(&["drived/#"]));
     let sim = Sim::serve_with("profile-faces", &["wj200@3"], &["--baud", "19200", "--format", "8N1"]);
     let (http, gateway, state) = (free_port(), free_port(), path("profile-faces-state"));
@@ -73,7 +82,7 @@ fn what_nobody_can_know_of_a_drive_is_said_by_each_face_and_shown_by_none_as_a_v
         (about.to_string(), state.to_string())
     });
     let shown = run(&["profile", "show", "wj200"]);
-    if crate::page::Page::is_installed() {
+    if page::Page::is_installed() {
         the_page_tells_it_in_both_languages(http);
     }
     // On a terminal: what is not told is a dash there too.
@@ -199,7 +208,7 @@ fn told_of(stream: TcpStream) -> String {
 
 /// Each sentence in the language of the page, and beside a parameter that is no holding register where it stands.
 fn the_page_tells_it_in_both_languages(http: u16) {
-    let mut page = crate::page::Page::open(http);
+    let mut page = page::Page::open(http);
     let shown = page.shows("unseen pump");
     let of = |language: &str| {
         let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
