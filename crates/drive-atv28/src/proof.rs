@@ -37,6 +37,8 @@ impl<P: Port> Atv28<P> {
         let needed = state.needs_command(self.command()).then_some(Look::Control);
         let things = self.proof.watch.run.lease().map_or(0, |_| TURNS.len());
         let wanted = self.wanted(&words);
+        let [.., (_, elsewhere)] = wanted;
+        let wanted = self.proof.goes_on(wanted, 2, elsewhere);
         if let Some(look) = self.proof.choose(needed, wanted, things, |turn| TURNS[turn]) {
             // The status is good without it.
             let _ = self.look(look).await;

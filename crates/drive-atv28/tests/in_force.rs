@@ -158,3 +158,14 @@ async fn a_limit_across_the_setpoint_is_no_other_reference_whether_it_bounds_frh
         }
     }
 }
+
+/// An analog input is another word at each reading, and each of them another question.
+#[tokio::test(start_paused = true)]
+async fn a_reference_from_elsewhere_that_never_stands_still_is_told_as_another_one() {
+    let mut port = Words::new(&CAPABILITIES, &[&STANDS[..], &RUNS[..], &[(450, 400)]].concat());
+    port.wanders = Some(450);
+    let mut drive = Atv28::new(port, 1.try_into().unwrap());
+    drive.adopt(Lease::new(Direction::Forward, 0x000F));
+    let told = lacks_within(&mut drive, 20).await;
+    assert_eq!(told.map(|(lack, _)| lack), Some(Lack::Reference));
+}

@@ -53,6 +53,8 @@ impl<P: Port> Atv312<P> {
         let untold = status.output_frequency.is_none();
         let needed = (untold || words.state_words().needs_command(self.command())).then_some(Look::Controls);
         let (wanted, things) = (self.wanted(&words, &status), self.turn_count());
+        let [_, _, (_, elsewhere), ..] = wanted;
+        let wanted = self.proof.goes_on(wanted, 2, elsewhere);
         if let Some(look) = self.proof.choose(needed, wanted, things, Look::Turn) {
             // The status is good without it.
             let _ = self.look(look).await;

@@ -451,3 +451,16 @@ async fn whatever_setting_was_learnt_is_read_again_in_its_turn() {
         assert!(asked[100..].iter().any(|asked| asked.reads(setting)), "{setting} was read once");
     }
 }
+
+/// An analog input is another word at each reading, and each of them another question.
+#[tokio::test(start_paused = true)]
+async fn a_reference_from_elsewhere_that_never_stands_still_is_told_as_another_one() {
+    let mut port = Words::new(&CAPABILITIES, &[&FOR_THE_BUS[..], &RUNS[..], &[(3203, 400)]].concat());
+    port.wanders = Some(3203);
+    let mut drive = Atv312::new(port, 1.try_into().unwrap());
+    drive.status().await.unwrap();
+    drive.self_restarts().await.unwrap();
+    drive.adopt(Lease::new(Direction::Forward, 0x000F));
+    let told = lacks_within(&mut drive, 20).await;
+    assert_eq!(told.map(|(lack, _)| lack), Some(Lack::Reference));
+}

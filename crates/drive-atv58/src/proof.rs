@@ -40,6 +40,7 @@ impl<P: Port> Atv58<P> {
                     self.map.speed_limits.is_some() && (elsewhere || self.proof.limits().is_none()),
                 ),
             ];
+            let wanted = self.proof.goes_on(wanted, 1, elsewhere);
             if let Some(look) = self.proof.choose(None, wanted, TURNS.len(), |turn| TURNS[turn]) {
                 // The status is good without it.
                 let _ = self.look(look).await;

@@ -268,3 +268,14 @@ async fn a_run_command_is_withdrawn_where_the_motor_has_no_output_whoever_keeps_
         assert_eq!(drive.into_port().written(), written);
     }
 }
+
+/// An analog input is another word at each reading, and each of them another question.
+#[tokio::test(start_paused = true)]
+async fn a_reference_from_elsewhere_that_never_stands_still_is_told_as_another_one() {
+    let mut port = Words::new(&CAPABILITIES, &[&RUNS[..], &[(450, 400)]].concat());
+    port.wanders = Some(450);
+    let mut drive = Atv58::with_map(port, 1.try_into().unwrap(), Atv58Map::default());
+    drive.adopt(Lease::new(Direction::Forward, 0x000F));
+    let told = lacks_within(&mut drive, 20).await;
+    assert_eq!(told.map(|(lack, _)| lack), Some(Lack::Reference));
+}

@@ -54,6 +54,8 @@ pub struct Proof<L> {
     limits: Option<(Option<Limits>, Instant)>,
     question: Option<Question>,
     looked: Vec<L>,
+    /// The looks that were taken since the reference is not told to be the bus's, behind whatever words; `None`: it is.
+    since_elsewhere: Option<Vec<L>>,
     /// The status before showed the reaction to a fault.
     reacted: bool,
 }
@@ -70,6 +72,7 @@ impl<L> Default for Proof<L> {
             limits: None,
             question: None,
             looked: Vec::new(),
+            since_elsewhere: None,
             reacted: false,
         }
     }
@@ -213,8 +216,28 @@ impl<L: Copy + PartialEq> Proof<L> {
         self.looked.contains(look)
     }
 
+    /// What is wanted behind a status by which the reference is `elsewhere`, or not told to be the bus's, from the first look on that was not
+    /// taken since it is, to the one that decides at the latest: a reference that never stands still, such as that of an analog input, is
+    /// another question each time, and would get the first look alone for ever.
+    pub fn goes_on<const N: usize>(
+        &mut self,
+        mut wanted: [(L, bool); N],
+        decides: usize,
+        elsewhere: bool,
+    ) -> [(L, bool); N] {
+        let taken = elsewhere.then(|| self.since_elsewhere.take().unwrap_or_default());
+        let was_taken = |(look, _): &&(L, bool)| taken.iter().flatten().any(|taken| taken == look);
+        let passed = wanted.iter().take(decides).take_while(was_taken).count();
+        wanted.rotate_left(passed);
+        self.since_elsewhere = taken;
+        wanted
+    }
+
     /// This look was taken.
     pub fn looked(&mut self, look: L) {
+        if let Some(taken) = self.since_elsewhere.as_mut().filter(|taken| !taken.contains(&look)) {
+            taken.push(look);
+        }
         self.looked.push(look);
     }
 

@@ -44,6 +44,8 @@ pub struct Words {
     pub refused: BTreeMap<u16, u8>,
     /// The exception that every write is answered by.
     pub refuses_writes: Option<u8>,
+    /// A word that is another at each reading, as that of an analog input is.
+    pub wanders: Option<u16>,
     /// What function 08 answers, where that is not its request.
     pub loop_back: Option<Vec<u8>>,
     capabilities: &'static Capabilities,
@@ -61,6 +63,7 @@ impl Words {
             deaf: false,
             refused: BTreeMap::new(),
             refuses_writes: None,
+            wanders: None,
             loop_back: None,
             capabilities,
             terms: Terms::default(),
@@ -84,8 +87,13 @@ impl Words {
         if let Some(code) = registers.clone().find_map(|register| self.refused.get(&register)) {
             return Err(ExceptionCode::new(*code));
         }
+        let wanders = self.wanders.filter(|register| registers.contains(register));
         let values = registers.map(|register| self.words.get(&register).copied().unwrap_or(0));
-        Ok(Response::ReadHoldingRegisters(values.collect()))
+        let answer = Response::ReadHoldingRegisters(values.collect());
+        if let Some(register) = wanders {
+            *self.words.entry(register).or_default() += 3;
+        }
+        Ok(answer)
     }
 
     fn write(&mut self, first: u16, values: &[u16], answer: Response) -> tokio_modbus::Result<Response> {
