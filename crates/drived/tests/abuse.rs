@@ -28,8 +28,9 @@ fn assert_status(answer: &str, status: u16) {
     assert!(answer.starts_with(&format!("HTTP/1.1 {status} ")), "expected {status}: {answer}");
 }
 
-/// 100 MB in pieces, as long as they are taken; then what is answered.
-fn pour(port: u16, head: &str, piece: &[u8]) -> String {
+/// 100 MB in pieces, as long as they are taken; then what is answered, unless what was sent into the closed connection has taken it
+/// with it.
+fn pour(port: u16, head: &str, piece: &[u8]) -> Option<String> {
     let mut stream = TcpStream::connect(("127.0.0.1", port)).expect("it listens");
     stream.write_all(head.as_bytes()).expect("it reads the head");
     for _ in 0..100_000_000 / piece.len() {
@@ -39,9 +40,8 @@ fn pour(port: u16, head: &str, piece: &[u8]) -> String {
     }
     let mut answer = Vec::new();
     match stream.read_to_end(&mut answer) {
-        // What was sent into the closed connection may have taken the answer with it.
-        Err(error) if error.kind() == ErrorKind::ConnectionReset => "HTTP/1.1 413 ".to_owned(),
-        _ => String::from_utf8_lossy(&answer).into_owned(),
+        Err(error) if error.kind() == ErrorKind::ConnectionReset => None,
+        _ => Some(String::from_utf8_lossy(&answer).into_owned()),
     }
 }
 
@@ -107,12 +107,19 @@ fn whatever_comes_over_http_statuses_keep_coming_and_a_stop_is_carried_out() {
     let form = "POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/plain\r\nContent-Length: 2\r\n\
                 Connection: close\r\n\r\n{}";
     assert_status(&ask(port, form), 415);
-    let head = "POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n";
-    let long = pour(port, &format!("{head}Content-Length: 100000000\r\n\r\n"), &[b' '; 65_536]);
-    assert_status(&long, 413);
+    // Who says too much is refused; a stop is one whatever else it says.
+    let head = |target| format!("POST {target} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n");
     let piece = format!("10000\r\n{}\r\n", " ".repeat(65_536));
-    let chunked = pour(port, &format!("{head}Transfer-Encoding: chunked\r\n\r\n"), piece.as_bytes());
-    assert_status(&chunked, 413);
+    for (target, status) in [("/api/v1/login", 413), ("/api/v1/drives/pump%202/stop", 200)] {
+        let head = head(target);
+        let answers = [
+            pour(port, &format!("{head}Content-Length: 100000000\r\n\r\n"), &[b' '; 65_536]),
+            pour(port, &format!("{head}Transfer-Encoding: chunked\r\n\r\n"), piece.as_bytes()),
+        ];
+        for answer in answers.iter().flatten() {
+            assert_status(answer, status);
+        }
+    }
 
     // Meanwhile the drives are asked and answer, and whoever has the right stops them.
     for _ in 0..4 {
