@@ -8,9 +8,9 @@ use drive_bus::{
     protocol::{AsciiSettings, UniTelwaySettings},
     unite::{SpecificCommand, UniTeError},
 };
-use drive_core::{Class, Direction, Frequency, PortError, SerialSettings, SlaveAddress, StopMode, Terms};
+use drive_core::{Class, Direction, Frequency, PortError, Row, SerialSettings, SlaveAddress, StopMode, Terms};
 use drive_families::Family;
-use drive_sim::{ALWAYS, Delivery, Fault, Faults, SimLine, SimSlave, Wiring, models::atv58::Atv58};
+use drive_sim::{ALWAYS, Delivery, Exception, Fault, Faults, SimLine, SimSlave, Wiring, models::atv58::Atv58};
 use drive_testing::{rig::ADDRESS, witness::Witnesses};
 use support::{attended::Attended, contracts::contract};
 use tokio_modbus::{Request, Response, client::Client};
@@ -114,6 +114,18 @@ async fn a_mute_uni_telway_slave_does_not_keep_the_others_waiting() {
         tokio::time::sleep(Duration::from_millis(100)).await;
     }
     assert_eq!(line.stats().slaves[&2].outcomes.timeouts, 0);
+}
+
+/// The manual's own word for it, p. 13/37: no exception of Modbus says it.
+#[tokio::test(start_paused = true)]
+async fn a_negative_reply_is_told_as_one_and_in_no_word_of_modbus() {
+    let (simulated, line) = line(unitelway(), &[1], Delivery::Whole);
+    let mut drive = Family::ATV58.open(line.slave(1), SlaveAddress::MIN);
+    let row = Row::find(drive_atv58::ROWS, "ACC").expect("it has one");
+    drive.read_parameter(row).await.expect("it answers");
+    machine(&simulated, 1).refuse_next(Exception::ILLEGAL_VALUE);
+    let refused = drive.read_parameter(row).await.expect_err("it refuses");
+    assert!(refused.to_string().ends_with("negative reply FDh, the drive refuses it and says no reason"), "{refused}");
 }
 
 #[tokio::test(start_paused = true)]

@@ -15,7 +15,7 @@ pub mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Absent, Capabilities, Class, Direction, ExceptionMeaning, Port, Quantity, Registers, Result, Row,
+    Absent, Capabilities, Class, Direction, ExceptionMeaning, NEGATIVE_REPLY, Port, Quantity, Registers, Result, Row,
     SerialSettings, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 use drive_drivecom::Proof;
@@ -169,7 +169,10 @@ impl<P: Port> Atv58<P> {
     }
 }
 
-/// The exceptions of p. 22/46.
+/// The exceptions of p. 22/46, and UNI-TE's negative reply (p. 13/37).
 const fn meaning(_function: u8, code: u8) -> ExceptionMeaning {
-    ExceptionMeaning::standard(code)
+    match code {
+        NEGATIVE_REPLY => ExceptionMeaning::Refused,
+        code => ExceptionMeaning::standard(code),
+    }
 }

@@ -49,6 +49,9 @@ impl fmt::Display for Exchange {
 /// Server device busy: the slave has done nothing, and wants to be asked again (Modbus Application Protocol V1.1b3, section 7).
 pub(crate) const BUSY: u8 = 6;
 
+/// The negative reply of UNI-TE (Altivar 58, p. 13/37), where it stands for an exception: no code of Modbus.
+pub const NEGATIVE_REPLY: u8 = 0xFD;
+
 /// What an exception means on a drive of this family, and so what to do about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -68,12 +71,16 @@ pub enum ExceptionMeaning {
     Accepted,
     /// The drive is busy with something else and has done nothing: it is asked again.
     Busy,
+    /// The drive refuses it and says no reason, as a negative reply of UNI-TE does.
+    Refused,
+    /// What stands between, a gateway or a network, says that it has no way to the drive.
+    NoPath,
     /// A code that the manual does not list.
     Unknown,
 }
 
 impl ExceptionMeaning {
-    /// What the Modbus specification says of the codes 1 to 6, for families whose manual says the same.
+    /// What the Modbus specification says of the codes 1 to 6 and 0Ah, for families whose manual says the same.
     #[must_use]
     pub const fn standard(code: u8) -> Self {
         match code {
@@ -83,18 +90,24 @@ impl ExceptionMeaning {
             4 => Self::Failed,
             5 => Self::Accepted,
             BUSY => Self::Busy,
+            0x0A => Self::NoPath,
             _ => Self::Unknown,
         }
     }
 
     /// Whether it says of a write that nothing was done by it. "Began and could not complete" (04h), "takes long" (05h), a
-    /// gateway's "heard no answer" (0Bh) and a code of which the manual says nothing leave that open: the write may have been
+    /// gateway's or network's "no way to it" (0Ah) and "heard no answer" (0Bh) and a code of which the manual says nothing leave that open: the write may have been
     /// carried out, and a run word may turn the motor.
     #[must_use]
     pub const fn denies(self) -> bool {
         matches!(
             self,
-            Self::NoSuchFunction | Self::NoSuchRegister | Self::ValueRefused | Self::NotNow | Self::Busy
+            Self::NoSuchFunction
+                | Self::NoSuchRegister
+                | Self::ValueRefused
+                | Self::NotNow
+                | Self::Busy
+                | Self::Refused
         )
     }
 
@@ -117,8 +130,18 @@ impl fmt::Display for ExceptionMeaning {
             Self::Failed => "the drive could not complete it",
             Self::Accepted => "the drive has accepted it and takes long for it",
             Self::Busy => "the drive is busy",
+            Self::Refused => "the drive refuses it and says no reason",
+            Self::NoPath => "what stands between has no way to the drive",
             Self::Unknown => "a code that the manual does not list",
         })
+    }
+}
+
+/// What the protocol that has this code calls it.
+const fn name_of(code: u8) -> &'static str {
+    match code {
+        NEGATIVE_REPLY => "negative reply",
+        _ => "exception",
     }
 }
 
@@ -193,13 +216,13 @@ pub enum Error {
         problem: PortError,
     },
     /// The drive refused the request.
-    #[error("slave {slave}, {exchange}: exception {code:02X}h, {meaning}")]
+    #[error("slave {slave}, {exchange}: {} {code:02X}h, {meaning}", name_of(*code))]
     Exception {
         /// The slave that refused.
         slave: SlaveAddress,
         /// What was asked.
         exchange: Exchange,
-        /// The exception code.
+        /// The exception code; [`NEGATIVE_REPLY`] for one of UNI-TE.
         code: u8,
         /// What it means on this family.
         meaning: ExceptionMeaning,

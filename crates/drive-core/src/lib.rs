@@ -61,7 +61,7 @@ pub use capabilities::{
 };
 pub use confirm::{CONFIRMED_WITHIN, Confirming, SETTLED_WITHIN};
 pub use drive::{BroadcastWrite, Drive};
-pub use error::{Error, ErrorKind, ExceptionMeaning, Exchange, Result, SetpointProblem};
+pub use error::{Error, ErrorKind, ExceptionMeaning, Exchange, NEGATIVE_REPLY, Result, SetpointProblem};
 pub use faults::{Fault, FaultEntry, Faults};
 pub use identity::Identity;
 pub use intent::Intent;

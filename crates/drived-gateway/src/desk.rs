@@ -10,7 +10,7 @@ use std::{
 };
 
 use drive_core::{
-    Class, Port as _, PortError, Terms,
+    Class, NEGATIVE_REPLY, Port as _, PortError, Terms,
     tokio_modbus::{ExceptionCode, Response, client::Client as _},
 };
 use drive_fleet::{DriveHandle, LineBudget, Place};
@@ -313,6 +313,10 @@ impl Desk {
                     self.kept.keep(drive.place(), ask, words, at, self.config.max_age);
                 }
                 return Ok(pdu::answer(ask, response));
+            }
+            // Without a reason: what comes nearest in Modbus.
+            Ok(Ok(Err(ExceptionCode::Custom(NEGATIVE_REPLY)))) => {
+                return Err(ExceptionCode::IllegalDataValue);
             }
             Ok(Ok(Err(exception))) => return Err(exception),
             Ok(Err(error)) => code_of(&PortError::from_modbus(error)),

@@ -2,6 +2,8 @@
 
 use std::{fmt, time::Duration};
 
+use drive_core::NEGATIVE_REPLY;
+
 /// What is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -267,6 +269,7 @@ const fn meaning(code: u8) -> &'static str {
         0x06 => "it is busy",
         0x0A => "the gateway has no path to it",
         0x0B => "the gateway had no answer from it",
+        NEGATIVE_REPLY => "a negative reply of UNI-TE, which says no reason",
         _ => "which the specification does not name",
     }
 }

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use bytes::Bytes;
-use drive_core::{Class, serial::SerialSettings};
+use drive_core::{Class, NEGATIVE_REPLY, serial::SerialSettings};
 use drive_unitelway::{Refusal, Reply, UniTelwaySettings};
 use tokio::time::Instant;
 use tokio_modbus::{
@@ -65,8 +65,7 @@ impl UniTelway {
                         .and_then(|asked| decode(&asked, reply))
                         .map(Ok)
                         .ok_or_else(|| Failure::Mismatch("the reply to another request".to_owned())),
-                    // Without a reason: what the exception 03 says.
-                    Ok(Err(Refusal::Negative)) => Ok(Err(ExceptionCode::IllegalDataValue)),
+                    Ok(Err(Refusal::Negative)) => Ok(Err(ExceptionCode::Custom(NEGATIVE_REPLY))),
                     Ok(Err(Refusal::Undeliverable)) => Ok(Err(ExceptionCode::GatewayPathUnavailable)),
                     Err(F::Timeout) => Err(Failure::Timeout),
                     Err(F::Damaged(why)) => Err(Failure::Damaged(why)),

@@ -11,6 +11,7 @@ const EXCEPTIONS = {
   6: 'il est occupé',
   10: 'la passerelle n’a pas de chemin vers lui',
   11: 'la passerelle n’a pas eu de réponse de lui',
+  253: 'une réponse négative d’UNI-TE, qui ne dit pas pourquoi',
 };
 
 /** From what it cannot be told. */
