@@ -581,6 +581,10 @@ async fn a_motor_whose_setpoint_nobody_could_have_given_is_not_started_until_one
         for direction in [Direction::Forward, Direction::Reverse] {
             let error = rig.drive.start(direction).await.expect_err(why);
             assert!(error.to_string().contains(&format!("the setpoint that stands in it {why}")), "{error}");
+            // Who starts several asks each beforehand: one that is given the setpoint with its start would start.
+            assert_eq!(rig.drive.may_start(direction, None).await.expect_err(why), error);
+            let given = Some(Frequency::from_hertz(30).into());
+            rig.drive.may_start(direction, given).await.expect("it would start");
         }
     }
     assert_eq!(rig.machine.received().iter().filter(|request| !is_read(request)).count(), written);

@@ -70,17 +70,20 @@ impl<P: Port> ProfileDrive<P> {
         }
     }
 
+    /// Whether the setpoint that stands is one to start by, where none is given with the start.
+    pub(super) async fn check_standing(&mut self, direction: Direction) -> Result<()> {
+        let is_the_start = self.profile.start(direction).is_some_and(Action::starts_by_setpoint);
+        let lacks = (is_the_start && self.kept.is_none()).then_some(NO_SETPOINT);
+        let reason = if lacks.is_some() { lacks } else { self.refuses_standing().await? };
+        reason.map_or(Ok(()), |reason| Err(self.refused(Order::Start(direction), reason)))
+    }
+
     pub(super) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
         let order = Order::Start(direction);
         let was_fed = self.start_is_allowed(direction).await?;
+        self.check_standing(direction).await?;
         let profile = self.profile.clone();
         let Some(action) = profile.start(direction) else { return Err(NO_SUCH_START) };
-        if action.starts_by_setpoint() && self.kept.is_none() {
-            return Err(self.refused(order, NO_SETPOINT));
-        }
-        if let Some(reason) = self.refuses_standing().await? {
-            return Err(self.refused(order, reason));
-        }
         // At another one than was given nothing starts.
         self.agreed_before = None;
         if self.agreed.is_none() {

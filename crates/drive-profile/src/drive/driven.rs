@@ -101,9 +101,10 @@ impl<P: Port> Drive for ProfileDrive<P> {
         self.start_motor(direction).await
     }
 
-    async fn may_start(&mut self, direction: Direction, _: Option<Setpoint>) -> Result<()> {
+    async fn may_start(&mut self, direction: Direction, setpoint: Option<Setpoint>) -> Result<()> {
         self.registers.begin_order();
-        self.start_is_allowed(direction).await.map(drop)
+        self.start_is_allowed(direction).await?;
+        if setpoint.is_some() { Ok(()) } else { self.check_standing(direction).await }
     }
 
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {
