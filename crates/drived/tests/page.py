@@ -744,6 +744,15 @@ def as_shown(page, url, token, chief, config):
     expect(said).to_contain_text("Start forward: question closed: the setpoint of pump 1 is 45.0 Hz now.")
     expect(dialog).to_have_count(0)
 
+    # Who is about to start it did not see that another one has.
+    start.click()
+    expect(dialog).to_contain_text("at 45.0 Hz?")
+    ask("drives/pump 1/start?wait=5s", {"direction": "reverse"})
+    expect(said).to_contain_text("Start forward: question closed: pump 1 is driven in reverse now.")
+    expect(dialog).to_have_count(0)
+    ask("drives/pump 1/stop?wait=5s", {})
+    expect(page.locator(".drive-head .state b")).to_have_text("Ready")
+
     # What the browser cannot know yet is judged where the drive is commanded.
     def meanwhile(route):
         give(30)

@@ -56,6 +56,29 @@ async fn a_start_at_the_setpoint_that_was_shown_is_refused_when_somebody_has_giv
     assert_eq!(command(&plant.plant, START, &body).await.0, StatusCode::OK);
 }
 
+/// Two people ask at one time: who answers his question second has not seen that the motor turns.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_somebody_else_has_started_meanwhile_is_not_turned_round() {
+    let plant = TestPlant::of(1).await;
+    give(&plant, "pump 1", 20.0).await;
+    let mut shown = shown(&plant, "pump 1").await;
+    shown["driven"] = "not".into();
+    let body = json!({"expects": {"drives": [shown]}});
+    let (status, told) = command(&plant.plant, START, &json!({"direction": "reverse"})).await;
+    assert_eq!(status, StatusCode::OK, "{told}");
+    let told = command(&plant.plant, START, &body).await;
+    assert_refused(&told, "pump 1 is driven in reverse now");
+    shown["driven"] = "forward".into();
+    let told = command(&plant.plant, START, &json!({"expects": {"drives": [shown]}})).await;
+    assert_refused(&told, "pump 1 is driven in reverse now");
+    command(&plant.plant, "/api/v1/stop?wait=20s", &json!({})).await;
+    tokio::time::sleep(std::time::Duration::from_secs(10)).await;
+    let told = command(&plant.plant, START, &json!({"expects": {"drives": [shown]}})).await;
+    assert_refused(&told, "pump 1 is not driven any more");
+    let (status, told) = command(&plant.plant, START, &body).await;
+    assert_eq!((status, is_running(&plant, 0)), (StatusCode::OK, true), "{told}");
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_setpoint_that_is_on_its_way_is_not_the_one_that_was_shown() {
     let plant = TestPlant::of(1).await;

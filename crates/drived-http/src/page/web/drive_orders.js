@@ -8,7 +8,7 @@ import { command, isDone, onOrder, orderText, ordersOf } from './orders.js';
 import { mayCommand, plant } from './plant.js';
 import { isTripped } from './selection.js';
 import { setpointControl } from './setpoint.js';
-import { shown } from './shown.js';
+import { shown, shownToStart } from './shown.js';
 import { t } from './texts.js';
 import { told } from './told.js';
 import { faultText } from './trouble.js';
@@ -62,7 +62,7 @@ export function ordersPanel(name) {
 
   async function start(direction) {
     const said = { drive: name, direction: t(`in_direction_${direction}`) };
-    const expects = shown([name], true);
+    const expects = shownToStart([name]);
     const at = expects.drives[0]?.setpoint;
     const question = at ? t('confirm_start_at', { ...said, setpoint: setpointText(at) }) : t('confirm_start', said);
     // What the drive follows by somebody else's word is his to give.

@@ -12,7 +12,7 @@ import { COLUMNS, makeRow } from './row.js';
 import { found } from './search.js';
 import { isTripped, listed, mayChoose, selectionBar } from './selection.js';
 import { severalPanel } from './several.js';
-import { shown as shownOf, shownToStop, withSetpoints } from './shown.js';
+import { shown as shownOf, shownToStart, shownToStop, withSetpoints } from './shown.js';
 import { isSortable, sorted } from './sort.js';
 import { named, t } from './texts.js';
 import { makeTile } from './tile.js';
@@ -239,7 +239,7 @@ export function overview(root, _, isBack) {
     const those = members();
     const give = body => command(name, action, path('groups', name, action), body);
     if (action === 'stop') return void give(shownToStop(those));
-    const expects = shownOf(those, action === 'start');
+    const expects = action === 'start' ? shownToStart(those) : shownOf(those);
     const question = t(`confirm_${action}_group`, { count: those.length, group: name });
     const these = t('these_are', { names: listed(action === 'start' ? withSetpoints(expects) : those) });
     const changed = () => String([...members()].sort()) !== String([...those].sort()) && t('group_changed');

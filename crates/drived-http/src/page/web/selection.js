@@ -6,7 +6,7 @@ import { el, setText } from './dom.js';
 import { quantity } from './format.js';
 import { command } from './orders.js';
 import { mayCommand, plant } from './plant.js';
-import { shown as shownOf, shownToStop, withSetpoints } from './shown.js';
+import { shown as shownOf, shownToStart, shownToStop, withSetpoints } from './shown.js';
 import { t } from './texts.js';
 
 const NAMED = 12;
@@ -76,7 +76,7 @@ export function selectionBar(chosen, changed) {
 
   async function askStart() {
     const names = fitting('start');
-    const expects = shownOf(names, true);
+    const expects = shownToStart(names);
     const asked = question('confirm_start_these', names, withSetpoints(expects));
     if (await confirmed(expects, asked, t('start_these', { count: names.length }))) give('start', names, { direction: 'forward', expects });
   }

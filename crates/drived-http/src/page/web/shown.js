@@ -9,12 +9,16 @@ const TREMBLES_HZ = 0.5;
 /** What a stop says of is short enough to be read by everybody between. */
 const STOPS_SAY = 100;
 
-/** What is shown of these drives now, as a command says it; with their setpoints where it starts them. */
-export function shown(names, withSetpoints = false) {
-  const drives = names.map(name => plant.drives.get(name)).filter(Boolean);
-  return { drives: drives.map(drive => {
-    const setpoint = withSetpoints && setpointOf(drive);
-    return { name: drive.name, place: drive.place, ...setpoint ? { setpoint } : {} };
+/** What is shown of these drives now, as a command says it. */
+export function shown(names) {
+  return { drives: drivesOf(names).map(({ name, place }) => ({ name, place })) };
+}
+
+/** The same for a start: also their setpoints, and which motors are driven. */
+export function shownToStart(names) {
+  return { drives: drivesOf(names).map(drive => {
+    const { name, place } = drive;
+    return { name, place, setpoint: setpointOf(drive) ?? undefined, driven: drivenOf(drive) };
   }) };
 }
 
@@ -30,16 +34,28 @@ export function withSetpoints({ drives }) {
 
 /** What is otherwise now, in words; nothing while all is as it was shown. */
 export function otherwise({ drives }) {
-  for (const { name, place, setpoint } of drives) {
+  for (const { name, place, setpoint, driven } of drives) {
     const now = plant.drives.get(name);
     if (now?.place !== place) {
       const other = [...plant.drives.values()].find(drive => drive.place === place);
       if (other) return t('now_called', { was: name, now: other.name });
       return t(now ? 'now_another' : 'now_gone', { drive: name });
     }
+    const drivenNow = drivenOf(now);
+    if (driven && drivenNow && drivenNow !== driven) return t(`now_driven_${drivenNow}`, { drive: name });
     if (setpoint && !isStill(setpoint, now)) return t('now_setpoint', { drive: name, setpoint: setpointText(setpointOf(now)) });
   }
   return '';
+}
+
+function drivesOf(names) {
+  return names.map(name => plant.drives.get(name)).filter(Boolean);
+}
+
+/** Which way its motor is driven, or that it is not; nothing where its words do not tell. */
+function drivenOf({ status }) {
+  if (!status?.motion || status.motion === 'not_known') return undefined;
+  return status.motion === 'driven' ? status.direction ?? undefined : 'not';
 }
 
 function isStill(setpoint, drive) {

@@ -3,7 +3,9 @@
 //! A name is who it is by the configuration of the moment, and a question to a person may stand for long. What stays with a motor
 //! is its place: the port, the family and the address at which it is asked.
 
-use drive_core::{Frequency, Setpoint};
+use std::fmt;
+
+use drive_core::{Direction, Frequency, Motion, Setpoint, Status};
 use drive_fleet::{DriveHandle, Place};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -35,6 +37,39 @@ struct AsShown {
     place: Place,
     /// The setpoint that was shown: the drive's `setpoint`, or else the `reference_hz` of its status. Not looked at unless it is said.
     setpoint: Option<Setpoint>,
+    /// Whether its motor was shown as driven, by the `motion` and the `direction` of its status. Not looked at unless it is said.
+    driven: Option<Driven>,
+}
+
+/// Whether a motor is driven, and which way it turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Driven {
+    Forward,
+    Reverse,
+    Not,
+}
+
+impl Driven {
+    /// `None`: the words do not tell.
+    fn of(status: &Status) -> Option<Self> {
+        match (status.motion, status.direction) {
+            (Motion::NotKnown, _) | (Motion::Driven, None) => None,
+            (Motion::Driven, Some(Direction::Forward)) => Some(Self::Forward),
+            (Motion::Driven, Some(Direction::Reverse)) => Some(Self::Reverse),
+            _ => Some(Self::Not),
+        }
+    }
+}
+
+impl fmt::Display for Driven {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Forward => "driven forward now",
+            Self::Reverse => "driven in reverse now",
+            Self::Not => "not driven any more",
+        })
+    }
 }
 
 /// What is otherwise than it was shown.
@@ -54,6 +89,8 @@ pub enum Otherwise {
     Setpoint { drive: String, now: Setpoint },
     #[error("the setpoint of {0} is not known any more")]
     NoSetpoint(String),
+    #[error("{drive} is {now}")]
+    Driven { drive: String, now: Driven },
     #[error("another setpoint is on its way to {drive}: {coming}")]
     SetpointComing { drive: String, coming: Setpoint },
 }
@@ -67,7 +104,7 @@ impl Expects {
 
 impl AsShown {
     fn of(drive: &DriveHandle) -> Self {
-        Self { name: drive.name().to_string(), place: drive.place().clone(), setpoint: None }
+        Self { name: drive.name().to_string(), place: drive.place().clone(), setpoint: None, driven: None }
     }
 }
 
@@ -111,6 +148,9 @@ impl Plant {
             if !names.contains(&shown.name) {
                 return Err(Otherwise::Left(shown.name.clone()));
             }
+            if let Some(driven) = shown.driven {
+                is_driven_so(driven, &drive)?;
+            }
             let Some(setpoint) = shown.setpoint else { continue };
             is_still(setpoint, &drive)?;
             let theirs =
@@ -142,6 +182,14 @@ impl Plant {
         }
         if names.len() == named { target } else { Target::Selected(names) }
     }
+}
+
+/// Whether a motor is driven as it was shown, as far as its words tell.
+fn is_driven_so(shown: Driven, drive: &DriveHandle) -> Result<(), Otherwise> {
+    let snapshot = drive.snapshot();
+    let now = snapshot.status.as_ref().and_then(|status| Driven::of(&status.value));
+    let otherwise = now.filter(|now| *now != shown);
+    otherwise.map_or(Ok(()), |now| Err(Otherwise::Driven { drive: drive.name().to_string(), now }))
 }
 
 /// Whether a setpoint that was shown is the one of now.
