@@ -53,6 +53,9 @@ pub struct Lifetimes {
     pub status: Option<Duration>,
     /// Parameters, histories, slow measurements.
     pub background: Option<Duration>,
+    /// The class in which what polls and identifies is asked instead of its own: [`Class::Stop`] where a stop waits for what it tells,
+    /// so that it goes to a slave that is off-line as the stop itself would.
+    pub polls_as: Option<Class>,
 }
 
 impl Lifetimes {
@@ -78,6 +81,7 @@ impl Default for Lifetimes {
             keep_alive: None,
             status: None,
             background: None,
+            polls_as: None,
         }
     }
 }
@@ -151,7 +155,11 @@ impl<P: Port> Registers<P> {
             self.begun = None;
         }
         let begun = if matches!(class, Class::Command) { self.begun } else { None };
-        let terms = Terms { lifetime: self.lifetimes.of(class), begun, ..Terms::of(class) };
+        let asked_as = match (class, self.lifetimes.polls_as) {
+            (Class::Status | Class::Background, Some(asked_as)) => asked_as,
+            _ => class,
+        };
+        let terms = Terms { lifetime: self.lifetimes.of(class), begun, ..Terms::of(asked_as) };
         Calls { registers: self, terms }
     }
 

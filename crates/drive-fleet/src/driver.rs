@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use drive_core::{Direction, Drive, Error, Ground, Lease, Lifetimes, Refusal, Setpoint};
+use drive_core::{Class, Direction, Drive, Error, Ground, Lease, Lifetimes, Refusal, Setpoint};
 use tokio::time::Instant;
 
 use crate::{
@@ -114,7 +114,9 @@ pub(crate) fn said(panic: &(dyn Any + Send)) -> String {
 /// How long what a job asks may wait until it is sent. The time of an order is that order's alone: what looks at a stop is in
 /// the class of commands, too, and waits for as long as it takes.
 fn lifetimes(job: Job, lifetime: Lifetime) -> Lifetimes {
-    let (usual, Lifetime { call, all }) = (Lifetimes::default(), lifetime);
+    let Lifetime { call, all, is_for_a_stop } = lifetime;
+    let polls_as = is_for_a_stop.then_some(Class::Stop);
+    let usual = Lifetimes { polls_as, ..Lifetimes::default() };
     match job {
         Job::Status { .. } => Lifetimes { status: call, ..usual },
         Job::SetSetpoint(..) | Job::Start(_) => {
@@ -202,7 +204,7 @@ mod tests {
     fn the_look_at_a_stop_has_all_the_time_whatever_was_left_to_the_order_before() {
         const MS_54: Duration = Duration::from_millis(54);
         let (time, usual) = (Some(MS_54), Lifetimes::default());
-        let short = Lifetime { call: time, all: time };
+        let short = Lifetime { call: time, all: time, ..Lifetime::default() };
         let setpoint = Frequency::from_hertz(20).into();
         for order in [Job::SetSetpoint(setpoint, None), Job::Start(Direction::Forward)] {
             let of_order = lifetimes(order, short);

@@ -59,6 +59,11 @@ impl Supervisor {
         self.not_adopted(why.to_owned());
     }
 
+    /// Whether a stop of before waits for the drive to say which it is.
+    pub(super) const fn owes_stop_of_before(&self) -> bool {
+        self.settings.control && matches!(&self.adoption, Adoption::Kept(record) if record.stop.is_some())
+    }
+
     /// Whether this is the drive of a record. A stop that was asked of one that had never said which it is goes to whoever answers.
     fn is_drive_of(&self, record: &RunRecord) -> bool {
         let is_of_nobody = record.lease.is_none() && record.identity.is_none();

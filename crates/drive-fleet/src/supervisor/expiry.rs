@@ -36,7 +36,7 @@ impl Expiry {
     /// What is left of it.
     pub(super) fn left(self, now: Instant, has_begun: bool) -> Lifetime {
         let left = |until: Instant| Some(until.saturating_duration_since(now));
-        Lifetime { call: left(self.of(has_begun)), all: left(self.sent) }
+        Lifetime { call: left(self.of(has_begun)), all: left(self.sent), ..Lifetime::default() }
     }
 }
 
@@ -47,12 +47,14 @@ pub(crate) struct Lifetime {
     pub(crate) call: Option<Duration>,
     /// All of its calls together, until the last is.
     pub(crate) all: Option<Duration>,
+    /// A stop waits for what it tells.
+    pub(crate) is_for_a_stop: bool,
 }
 
 impl Lifetime {
     /// A part of it is over already.
     pub(crate) fn without(self, time: Duration) -> Self {
         let less = |left: Option<Duration>| left.map(|left| left.saturating_sub(time));
-        Self { call: less(self.call), all: less(self.all) }
+        Self { call: less(self.call), all: less(self.all), ..self }
     }
 }

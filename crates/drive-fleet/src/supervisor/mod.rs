@@ -414,8 +414,12 @@ impl Supervisor {
 
     fn lifetime(&self, now: Instant, job: Job) -> Lifetime {
         match job {
+            // Which drive it is decides whether a stop of before is its own: it is looked for as the stop itself would be given.
+            Job::Status { .. } | Job::Identify if self.owes_stop_of_before() => {
+                Lifetime { is_for_a_stop: true, ..Lifetime::default() }
+            }
             Job::Status { .. } => {
-                Lifetime { call: Some(self.pace.until_next(now, self.is_busy())), all: None }
+                Lifetime { call: Some(self.pace.until_next(now, self.is_busy())), ..Lifetime::default() }
             }
             Job::SetSetpoint(..) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
                 self.order_lifetime(now)

@@ -8,6 +8,7 @@ use std::{
 
 use crossterm::{
     cursor::{Hide, Show},
+    event::{DisableBracketedPaste, EnableBracketedPaste},
     execute,
     terminal::{EnterAlternateScreen, LeaveAlternateScreen},
 };
@@ -30,7 +31,8 @@ impl Terminal {
             }));
         });
         let terminal = ratatui::Terminal::new(CrosstermBackend::new(io::stdout()))?;
-        execute!(io::stdout(), EnterAlternateScreen, Hide)?;
+        // What is pasted comes as a text and not as keys.
+        execute!(io::stdout(), EnterAlternateScreen, EnableBracketedPaste, Hide)?;
         keys::take();
         logging::show();
         Ok(Self(terminal))
@@ -53,7 +55,7 @@ fn give_back() {
         return;
     }
     // A terminal that is gone needs nothing.
-    let _ = execute!(io::stdout(), LeaveAlternateScreen, Show);
+    let _ = execute!(io::stdout(), DisableBracketedPaste, LeaveAlternateScreen, Show);
     keys::give_back();
     logging::write_again();
 }

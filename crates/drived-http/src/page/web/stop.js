@@ -149,6 +149,9 @@
   function news(command) {
     if (command.id === account.id && command.drives) take(command);
     if (command.action === 'stop') later.withdraw?.(command);
+    // Above a motor that turns again nobody reads that all have stopped.
+    const isOver = account.phase === 'taken' && !account.open && !left().length;
+    if (command.action === 'start' && command.outcome === 'confirmed' && isOver) end();
   }
 
   function take(answer) {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::words;
 use drived_plant::plant::{
-    commands::OutcomeWord,
+    commands::{ActionWord, OutcomeWord},
     views::{CommandView, SeveralView},
 };
 use drived_words::logging::escaped;
@@ -96,6 +96,18 @@ impl Account {
             &self.state,
             Sent::Taken { count: Count { is_open: false, not_reachable: 0, failed: 0, .. }, .. }
         )
+    }
+
+    /// Whether a motor that has confirmed it was started since.
+    pub(super) fn is_over_by(&self, command: &CommandView) -> bool {
+        let starts = command.action == ActionWord::Start && command.outcome == OutcomeWord::Confirmed;
+        let its = |name: &str| match &self.stop {
+            Stop::All => true,
+            Stop::One(own) => own == name,
+        };
+        let several = command.several.iter().flat_map(|several| &several.drives);
+        let mut names = several.filter_map(|one| one.drive.as_deref()).chain(command.drive.as_deref());
+        starts && !self.is_open() && self.is_done() && names.any(its)
     }
 
     /// What is told of it: first what was done, then how it stands.

@@ -118,11 +118,14 @@ async fn watching(ending: &mut Ending, source: &Source, model: &Arc<Mutex<Model>
             () = ending.asked() => break,
             key = keys.recv() => {
                 let Some(input) = key else { break };
-                let Event::Key(key) = input else {
-                    screen.nudge();
-                    continue;
+                let asked = match input {
+                    Event::Key(key) => locked(model).press(key, Instant::now()),
+                    Event::Paste(text) => {
+                        locked(model).paste(&text);
+                        None
+                    }
+                    _ => None,
                 };
-                let asked = locked(model).press(key, Instant::now());
                 match asked {
                     Some(Ask::Stop { number, stop }) => {
                         // Whatever else is to be done, this is on its way.

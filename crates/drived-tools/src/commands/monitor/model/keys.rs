@@ -44,6 +44,15 @@ impl Model {
         None
     }
 
+    /// What is pasted is no key: it is searched for where that is typed, and else it is nothing.
+    pub(in super::super) fn paste(&mut self, text: &str) {
+        if self.is_typing {
+            self.search.extend(text.chars().filter(|letter| !letter.is_control()));
+            self.scroll = 0;
+            self.mark(KeyCode::Null);
+        }
+    }
+
     fn command(&mut self, code: KeyCode, now: Instant) -> Option<Ask> {
         let KeyCode::Char(letter) = code else { return None };
         match letter.to_ascii_lowercase() {

@@ -126,7 +126,13 @@ impl Model {
     pub(super) fn take(&mut self, news: News, now: Instant) {
         match news {
             News::State { state, recent, kept } => self.plant.begin(*state, &recent, kept, now),
-            News::Heard(heard) => self.plant.take(heard, now),
+            News::Heard(heard) => {
+                if let Heard::Command(command) = &heard {
+                    // Above a motor that turns again nobody reads that it has stopped.
+                    self.accounts.retain(|account| !account.is_over_by(command));
+                }
+                self.plant.take(heard, now);
+            }
             News::Interrupted(why) => self.plant.interrupted(why, now),
             News::History { drive, history } => {
                 if self.view == View::Drive(drive) {

@@ -349,6 +349,37 @@ fn a_stop_is_counted_until_every_drive_is_accounted_for() {
 }
 
 #[test]
+fn what_was_told_of_a_stop_goes_when_a_motor_that_confirmed_it_is_started() {
+    let mut monitor = Monitor::of(&[drive("pump 1"), drive("pump 2")]);
+    monitor.control('s');
+    let drives = ["pump 1", "pump 2"].map(|drive| json!({"drive": drive, "outcome": "confirmed"}));
+    let answer = json!({"id": "c-1", "outcome": "confirmed", "drives": drives,
+                        "confirmed": 2, "pending": 0, "not_reachable": 0});
+    monitor.model.take(News::Stop { number: 1, progress: Progress::Answer(command(answer)) }, monitor.now);
+    let start = |outcome: &str| {
+        let started = command(json!({"id": "c-2", "drive": "pump 2", "action": "start", "outcome": outcome}));
+        News::Heard(Heard::Command(Box::new(Arc::unwrap_or_clone(started))))
+    };
+    for outcome in ["pending", "refused"] {
+        monitor.model.take(start(outcome), monitor.now);
+        assert!(monitor.screen(80, 24).contains("2 confirmed"), "{outcome}: it stands still");
+    }
+    monitor.model.take(start("confirmed"), monitor.now);
+    assert!(!monitor.screen(80, 24).contains("2 confirmed"), "{}", monitor.screen(80, 24));
+}
+
+#[test]
+fn what_is_pasted_is_searched_for_where_that_is_typed_and_is_no_key() {
+    let mut monitor = Monitor::of(&[drive("pump 1"), drive("quiet fan")]);
+    monitor.model.paste("q1?");
+    assert!(monitor.screen(80, 24).contains("pump 1"));
+    monitor.press(KeyCode::Char('/'));
+    monitor.model.paste("quiet\n fan");
+    let screen = monitor.screen(80, 24);
+    assert!(screen.contains("search: quiet fan") && !screen.contains("pump 1"), "{screen}");
+}
+
+#[test]
 fn a_stop_that_could_not_be_given_says_so_and_names_the_emergency_stop() {
     let mut monitor = Monitor::of(&[drive("pump 1")]);
     monitor.control('s');
