@@ -418,7 +418,8 @@ pub enum OnLoss {
     /// An event; its state is adopted when it returns.
     #[default]
     Report,
-    /// It is stopped as soon as it can be reached, whatever it does then.
+    /// It is stopped as soon as it can be reached, whatever it does then, where there was no status for
+    /// [`max_age`](Periods::max_age): its line may have called it off-line sooner.
     Stop(StopMode),
 }
 

@@ -126,7 +126,9 @@ impl Supervisor {
         }
         self.check_limits();
         self.judge_setpoint(now);
+        // Its line may have called it off-line sooner.
         if was == Link::Lost
+            && silent_for >= self.settings.periods.max_age
             && self.settings.control
             && let OnLoss::Stop(mode) = self.settings.on_loss
         {

@@ -64,7 +64,7 @@ settings! {
     slow: Parsed<Time> = "`\"10s\"` ¹",
         |to, said| to.settings.periods.slow = said.0.0,
         tells "measurements" told::measurements;
-    /// an older status is stale, and the drive counts as lost
+    /// an older status is stale, and the drive counts as lost; so it does as soon as its line has asked it in vain often enough
     max_age: Parsed<Time> = "`\"3s\"` ¹", |to, said| to.settings.periods.max_age = said.0.0;
     /// `{ time = "10s", reaction = "ramp" }`: the drive's own communication watchdog, armed at standstill, verified and fed.
     /// Reactions: `ramp`, `fast`, `freewheel`, `dc-injection`, `trip`, as far as the family has them. In `[defaults]` it holds
@@ -106,7 +106,7 @@ settings! {
         acts(_),
         |to, said| to.settings.on_exit_watchdog = said.0.0,
         tells "its watchdog then" told::watchdog_at_exit;
-    /// `report`, or `stop` as soon as the drive is there again
+    /// `report`, or `stop` as soon as the drive is there again, where there was no status for `max_age`
     on_loss: Parsed<LossPolicy> = "`report`",
         acts(Parsed(LossPolicy(OnLoss::Stop(_)))),
         |to, said| to.settings.on_loss = said.0.0,

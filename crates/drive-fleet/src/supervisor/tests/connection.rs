@@ -187,6 +187,25 @@ fn a_drive_that_is_lost_is_told_once_and_stopped_on_return_where_the_policy_says
     }
 }
 
+/// `max_age` says for how long nobody needs to hear of a motor.
+#[test]
+fn a_drive_that_its_line_calls_off_line_for_less_than_max_age_is_lost_and_not_stopped() {
+    let mut rig = Rig::ready();
+    rig.machine.settings.on_loss = OnLoss::Stop(StopMode::Ramp);
+    rig.machine.settings.periods.max_age = 30_000 * MS;
+    rig.order(START);
+    rig.pass(1_000 * MS);
+    rig.drive.log.clear();
+    for (away, stops) in [(20_000, 0), (31_000, 1)] {
+        rig.drive.failing = Some(PortError::Offline { retry_in: 500 * MS });
+        rig.pass(away * MS);
+        assert_eq!(rig.snapshot().link, Link::Lost);
+        rig.drive.failing = None;
+        rig.pass(5_000 * MS);
+        assert_eq!(rig.drive.writes().len(), stops, "away for {away} ms");
+    }
+}
+
 #[test]
 fn a_watchdog_is_fed_by_a_frame_of_its_own_when_no_poll_does() {
     let mut rig = Rig::new(DriveSettings {
