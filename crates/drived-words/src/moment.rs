@@ -34,10 +34,21 @@ pub fn said<Tz: TimeZone>(text: &str, now: &DateTime<Tz>) -> Result<Said<Tz>, No
         return Ok(Said { at: now.clone(), again: None });
     }
     let local = local(text, now.naive_local()).ok_or_else(|| NoMoment::Unread(text.to_owned()))?;
-    match now.timezone().from_local_datetime(&local) {
-        LocalResult::Single(at) => Ok(Said { at, again: None }),
-        LocalResult::Ambiguous(at, again) => Ok(Said { at, again: Some(again) }),
-        LocalResult::None => Err(NoMoment::LeftOut(local)),
+    match in_order(now.timezone().from_local_datetime(&local)) {
+        (Some(at), again) => Ok(Said { at, again }),
+        (None, _) => Err(NoMoment::LeftOut(local)),
+    }
+}
+
+/// When a time of the clock was, and when it was again where it came twice. In which order a zone tells the two is its own.
+pub fn in_order<Tz: TimeZone>(
+    times: LocalResult<DateTime<Tz>>,
+) -> (Option<DateTime<Tz>>, Option<DateTime<Tz>>) {
+    match times {
+        LocalResult::Single(at) => (Some(at), None),
+        LocalResult::Ambiguous(one, other) if one <= other => (Some(one), Some(other)),
+        LocalResult::Ambiguous(one, other) => (Some(other), Some(one)),
+        LocalResult::None => (None, None),
     }
 }
 
@@ -132,6 +143,16 @@ mod tests {
         }
         for text in ["soon", "tomorrow 03:12", "25:00", "2026-13-01 03:12", ""] {
             assert_eq!(read(text, now), Err(NoMoment::Unread(text.to_owned())));
+        }
+    }
+
+    /// The zone of the machine tells the second of the two first, in Europe as in America.
+    #[test]
+    fn of_the_hour_that_comes_twice_the_earlier_one_is_the_first_whichever_its_zone_tells_first() {
+        let local = at(10, 25, 2, 30);
+        let [summer, winter] = [hours(2), hours(1)].map(|of| of.from_local_datetime(&local).unwrap());
+        for both in [LocalResult::Ambiguous(summer, winter), LocalResult::Ambiguous(winter, summer)] {
+            assert_eq!(in_order(both), (Some(summer), Some(winter)));
         }
     }
 

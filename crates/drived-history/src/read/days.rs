@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use chrono::{DateTime, Days, Local, NaiveTime, TimeZone as _};
 use drived_plant::plant::past::{DayView, EnergyFrom, EnergyView, RecordView, StepView};
+use drived_words::moment::in_order;
 use rusqlite::Connection;
 use serde::Deserialize;
 
@@ -42,10 +43,8 @@ fn midnights(from: i64, to: i64) -> impl Iterator<Item = (String, i64, i64)> {
     let at = |day: chrono::NaiveDate| {
         let midnight = day.and_time(NaiveTime::MIN);
         // Where midnight itself is left out the day begins an hour later.
-        let local = Local.from_local_datetime(&midnight);
-        local
-            .earliest()
-            .or_else(|| Local.from_local_datetime(&(midnight + chrono::Duration::hours(1))).earliest())
+        let first = |local| in_order(Local.from_local_datetime(&local)).0;
+        first(midnight).or_else(|| first(midnight + chrono::Duration::hours(1)))
     };
     let first = DateTime::from_timestamp_millis(from).map(|time| time.with_timezone(&Local).date_naive());
     let days = std::iter::successors(first, |day| day.checked_add_days(Days::new(1)));
