@@ -21,12 +21,11 @@ pub const NEVER_QUIET: &str = "the line is never quiet, something else is sendin
 pub fn wait_at_most(drive: &mut dyn Drive) {
     let all = Some(QUIET_WITHIN);
     *drive.lifetimes_mut() = Lifetimes {
-        stop: None,
         command: all,
-        command_until: None,
         keep_alive: all,
         status: all,
         background: all,
+        ..Lifetimes::default()
     };
 }
 

@@ -18,6 +18,9 @@ pub enum Failure {
     /// A drive did not answer, refused, or did not do it. Exit code 1.
     #[error("{0}")]
     Drive(String),
+    /// Our output takes nothing, such as a full disk: nobody has asked for anything wrong, and what was asked for may be done. Exit code 1.
+    #[error("the output cannot be written, and what was asked for may be done all the same: {0}")]
+    Output(String),
     /// Whoever read our output has gone. Nothing is said then. Exit code 1.
     #[error("nobody reads the output any more")]
     OutputClosed,
@@ -31,7 +34,7 @@ impl Failure {
     /// The exit code as a number.
     pub const fn code(&self) -> u8 {
         match self {
-            Self::Drive(_) | Self::OutputClosed => 1,
+            Self::Drive(_) | Self::Output(_) | Self::OutputClosed => 1,
             Self::Input(_) => 2,
         }
     }
@@ -40,7 +43,7 @@ impl Failure {
     pub fn output(error: &io::Error) -> Self {
         match error.kind() {
             io::ErrorKind::BrokenPipe => Self::OutputClosed,
-            _ => Self::Input(format!("cannot write the output: {error}")),
+            _ => Self::Output(error.to_string()),
         }
     }
 }

@@ -6,12 +6,14 @@ import { plant } from './plant.js';
 import { t } from './texts.js';
 
 let shown = '';
+/** Which cables were pulled or plugged in here, until their drives show it. */
+const asked = new Map();
 
 /** Shows the buttons in a demonstration; `driveName` is the drive that is looked at, if one is. */
 export function writeDemo(place, driveName) {
   place.hidden = !plant.daemon.demo || !plant.daemon.rights.operate;
   if (place.hidden) return;
-  const lines = [...plant.lines.values()].map(line => [line.name, line.link === 'away']);
+  const lines = [...plant.lines.values()].map(line => [line.name, isPulled(line.name)]);
   const now = JSON.stringify([document.documentElement.lang, driveName, lines]);
   if (now === shown) return;
   shown = now;
@@ -30,5 +32,13 @@ function tripOne(name) {
 }
 
 function cable(line, connected) {
-  post('demo/cable', { line, connected }).catch(() => {});
+  asked.set(line, connected);
+  post('demo/cable', { line, connected }).catch(() => asked.delete(line));
+}
+
+/** A line whose cable is pulled keeps its port: only that nobody on it answers tells it. */
+function isPulled(line) {
+  const isSilent = [...plant.drives.values()].every(drive => drive.line !== line || drive.link !== 'connected');
+  if (asked.get(line) === !isSilent) asked.delete(line);
+  return asked.has(line) ? !asked.get(line) : isSilent;
 }

@@ -30,7 +30,8 @@ const UNDRIVEN = new Set(['at_rest', 'held', 'coasting']);
 const FILTERS = {
   all: () => true,
   trouble: drive => isTrouble(trouble(drive)),
-  running_drives: drive => MOVING.has(drive.status?.state),
+  // One that stands in a quick stop is none.
+  running_drives: drive => MOVING.has(drive.status?.state) && !UNDRIVEN.has(drive.status.motion),
   // Of a drive that is lost nobody knows whether it is driven.
   undriven_drives: drive => quality(drive.status) === 'good' && UNDRIVEN.has(drive.status.motion),
   off_setpoint: drive => Math.abs(deviationOf(drive) ?? 0) > OFF_SETPOINT_HZ,

@@ -80,11 +80,14 @@ pub(super) async fn run(args: Args) -> Result<(), Failure> {
         return Err(Failure::Input(format!("the families {one} and {other} have no parameters in common")));
     }
     let comparison = Comparison::of(&left.backup, &right.backup, args.with_communication);
-    if args.source.daemon.is_json() {
-        output::say_as_it_is(comparison.json(&left.title, &right.title))?;
-    } else {
-        comparison.say(&left.title, &right.title)?;
-    }
+    let said = match args.source.daemon.is_json() {
+        true => output::say_as_it_is(comparison.json(&left.title, &right.title)),
+        false => comparison.say(&left.title, &right.title),
+    };
+    said.map_err(|failure| match failure {
+        Failure::Output(why) => Failure::Input(why),
+        failure => failure,
+    })?;
     match comparison.differences.len() {
         0 => Ok(()),
         1 => Err(Failure::Drive("1 parameter differs".to_owned())),
