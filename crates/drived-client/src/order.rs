@@ -49,22 +49,22 @@ pub async fn order(
     let answer = daemon.post(&path, &told.body).await?;
     let Some(first) = answer.command() else { return Err(answer.failure()) };
     let source = Remote::new(daemon, &first.id, ASKED_EVERY);
-    let say = |text: String| if args.is_json() { Ok(()) } else { output::say(text) };
+    let say = |text: String| output::done(if args.is_json() { Ok(()) } else { output::say(text) });
     let command = settled(Follower::from(source, Arc::new(first)), say).await?;
     if args.is_json() {
         let is_first = command.outcome != OutcomeWord::Pending && !answer.status.is_success();
-        output::say_as_it_is(if is_first { answer.body } else { json!(command) })?;
+        output::done(output::say_as_it_is(if is_first { answer.body } else { json!(command) }))?;
     }
     let Some(several) = &command.several else { return one(args, told, &command) };
     let mut left = Vec::new();
     for drive in &several.drives {
         match drive.outcome {
             OutcomeWord::Confirmed if args.is_json() => {}
-            OutcomeWord::Confirmed => output::say(sentence(told, drive))?,
+            OutcomeWord::Confirmed => output::done(output::say(sentence(told, drive)))?,
             // Those that are only read were never meant.
             _ if command.outcome == OutcomeWord::Confirmed => {
                 if !args.is_json() {
-                    output::say(format_args!("{}: {}", name(drive), why(drive)))?;
+                    output::done(output::say(format_args!("{}: {}", name(drive), why(drive))))?;
                 }
             }
             _ => left.push(format!("{}: {}", name(drive), why(drive))),
@@ -84,7 +84,7 @@ fn one(args: &DaemonArgs, told: &Told, command: &CommandView) -> Result<(), Fail
     let why = || format!("{}: {}", name(command), why(command));
     match command.outcome {
         OutcomeWord::Confirmed if args.is_json() => Ok(()),
-        OutcomeWord::Confirmed => output::say(sentence(told, command)),
+        OutcomeWord::Confirmed => output::done(output::say(sentence(told, command))),
         // Who has no right has asked for the wrong thing.
         OutcomeWord::Refused if command.reason.as_deref() == Some("no_right") => {
             Err(Failure::Input(command.text.clone().unwrap_or_else(why)))

@@ -49,7 +49,7 @@ const fn column(name: &'static str, meaning: &'static str, of: fn(&Shown) -> u16
 
 const FLAGS: Column = column(
     "flags",
-    "bits 0-3 state (as below), 4 forward, 5 reverse, 6 connected, 8-9 quality (as below), 10 fault, 11 alarm, 12 stop not confirmed yet, 13 started by the daemon",
+    "bits 0-3 state (as below), 4 forward, 5 reverse, 6 connected, 8-9 quality (as below), 10 fault, 11 a warning of the drive's own, 12 stop not confirmed yet, 13 started by the daemon, 14 something troubles it, as the page says",
     Shown::flags,
 );
 const FREQUENCY: Column =
@@ -179,6 +179,7 @@ impl Shown {
             | bit(self.live().is_some_and(|status| status.warning == Some(true)), 11)
             | bit(self.snapshot.as_ref().is_some_and(|snapshot| snapshot.stop.is_some()), 12)
             | bit(self.snapshot.as_ref().is_some_and(|snapshot| snapshot.started_here()), 13)
+            | bit(self.snapshot.as_ref().is_some_and(|snapshot| snapshot.concern(self.now).is_some()), 14)
     }
 
     fn state(&self) -> u16 {

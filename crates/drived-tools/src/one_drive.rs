@@ -134,7 +134,8 @@ impl OneDriveArgs {
         let name = one.name;
         let body =
             json!({ "drive": name.to_string(), "action": action, "outcome": "confirmed", "status": status });
-        self.daemon.say(&body, || output::say(format_args!("{name} {done}: the drive shows {status}")))
+        let said = self.daemon.say(&body, || output::say(format_args!("{name} {done}: the drive shows {status}")));
+        output::done(said)
     }
 
     /// The same for a start, with the setpoint that it uses.
@@ -144,7 +145,9 @@ impl OneDriveArgs {
             "drive": name.to_string(), "action": "start", "outcome": "confirmed", "text": started.to_string(), "started": started,
             "status": status,
         });
-        self.daemon.say(&body, || output::say(format_args!("{name} {started}: the drive shows {status}")))
+        let said =
+            self.daemon.say(&body, || output::say(format_args!("{name} {started}: the drive shows {status}")));
+        output::done(said)
     }
 
     /// The same for a stop, with how it was asked for and how the drive has stopped.
@@ -169,9 +172,9 @@ impl OneDriveArgs {
             );
         }
         let stopped = values::stopped(Some(status));
-        self.daemon.say(&body, || {
+        output::done(self.daemon.say(&body, || {
             output::say(format_args!("{name} {stopped}{by}{behind}: the drive shows {status}"))
-        })
+        }))
     }
 
     /// [`command`](Self::command) for a stop, which is sent as soon as the port can be opened.

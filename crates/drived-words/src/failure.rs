@@ -18,8 +18,8 @@ pub enum Failure {
     /// A drive did not answer, refused, or did not do it. Exit code 1.
     #[error("{0}")]
     Drive(String),
-    /// Our output takes nothing, such as a full disk: nobody has asked for anything wrong, and what was asked for may be done. Exit code 1.
-    #[error("the output cannot be written, and what was asked for may be done all the same: {0}")]
+    /// Our output takes nothing, as on a full disk. Exit code 1.
+    #[error("the output cannot be written: {0}")]
     Output(String),
     /// Whoever read our output has gone. Nothing is said then. Exit code 1.
     #[error("nobody reads the output any more")]

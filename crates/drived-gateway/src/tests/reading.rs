@@ -264,6 +264,7 @@ async fn the_virtual_unit_has_all_drives_in_one_read_and_marks_what_is_old() {
     assert_eq!(flags >> 4 & 0x0007, 0b101, "forward, connected");
     assert_eq!(flags >> 8 & 0x0003, 2, "good");
     assert_eq!(flags >> 13 & 1, 1, "started by the daemon");
+    assert_eq!([flags, of(4)[0]].map(|flags| flags >> 14 & 1), [0, 1], "what is lost troubles somebody");
     assert_eq!(frequency, 3_000);
     assert!(current < 1_000 && age < 30, "{current} {age}");
     assert_eq!(of(4)[0] >> 8 & 0x0003, 1, "the mute one is old");

@@ -95,6 +95,18 @@ impl JsonArgs {
     }
 }
 
+/// What has been told of what is done: it is done whether or not anybody reads that, and only said on stderr where it cannot be written.
+pub fn done(told: Result<(), Failure>) -> Result<(), Failure> {
+    match told {
+        Err(failure @ Failure::Output(_)) => {
+            complain(failure);
+            Ok(())
+        }
+        Err(Failure::OutputClosed) => Ok(()),
+        told => told,
+    }
+}
+
 /// Says on stderr what is not well on the way, if anybody reads that.
 pub fn complain(what: impl fmt::Display) {
     tell(&what, |what| json!({ "warning": what }));
