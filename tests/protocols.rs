@@ -8,9 +8,13 @@ use drive_bus::{
     protocol::{AsciiSettings, UniTelwaySettings},
     unite::{SpecificCommand, UniTeError},
 };
-use drive_core::{Class, Direction, Frequency, PortError, Row, SerialSettings, SlaveAddress, StopMode, Terms};
+use drive_core::{
+    Class, Direction, Frequency, PortError, Row, SerialSettings, SlaveAddress, StopMode, Terms,
+};
 use drive_families::Family;
-use drive_sim::{ALWAYS, Delivery, Exception, Fault, Faults, SimLine, SimSlave, Wiring, models::atv58::Atv58};
+use drive_sim::{
+    ALWAYS, Delivery, Exception, Fault, Faults, SimLine, SimSlave, Wiring, models::atv58::Atv58,
+};
 use drive_testing::{rig::ADDRESS, witness::Witnesses};
 use support::{attended::Attended, contracts::contract};
 use tokio_modbus::{Request, Response, client::Client};
@@ -125,7 +129,10 @@ async fn a_negative_reply_is_told_as_one_and_in_no_word_of_modbus() {
     drive.read_parameter(row).await.expect("it answers");
     machine(&simulated, 1).refuse_next(Exception::ILLEGAL_VALUE);
     let refused = drive.read_parameter(row).await.expect_err("it refuses");
-    assert!(refused.to_string().ends_with("negative reply FDh, the drive refuses it and says no reason"), "{refused}");
+    assert!(
+        refused.to_string().ends_with("negative reply FDh, the drive refuses it and says no reason"),
+        "{refused}"
+    );
 }
 
 #[tokio::test(start_paused = true)]

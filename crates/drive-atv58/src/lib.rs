@@ -15,8 +15,8 @@ pub mod words;
 use std::time::Duration;
 
 use drive_core::{
-    Absent, Capabilities, Class, Direction, ExceptionMeaning, NEGATIVE_REPLY, Port, Quantity, Registers, Result, Row,
-    SerialSettings, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
+    Absent, Capabilities, Class, Direction, ExceptionMeaning, NEGATIVE_REPLY, Port, Quantity, Registers,
+    Result, Row, SerialSettings, SlaveAddress, StopMode, WatchdogCapability, serial::CharacterFormat,
 };
 use drive_drivecom::Proof;
 

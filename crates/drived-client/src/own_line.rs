@@ -20,13 +20,8 @@ pub const NEVER_QUIET: &str = "the line is never quiet, something else is sendin
 /// Lets no request to a drive wait without end for a line that is never quiet.
 pub fn wait_at_most(drive: &mut dyn Drive) {
     let all = Some(QUIET_WITHIN);
-    *drive.lifetimes_mut() = Lifetimes {
-        command: all,
-        keep_alive: all,
-        status: all,
-        background: all,
-        ..Lifetimes::default()
-    };
+    *drive.lifetimes_mut() =
+        Lifetimes { command: all, keep_alive: all, status: all, background: all, ..Lifetimes::default() };
 }
 
 /// What a person reads when a drive did not do it.

@@ -134,7 +134,8 @@ impl OneDriveArgs {
         let name = one.name;
         let body =
             json!({ "drive": name.to_string(), "action": action, "outcome": "confirmed", "status": status });
-        let said = self.daemon.say(&body, || output::say(format_args!("{name} {done}: the drive shows {status}")));
+        let said =
+            self.daemon.say(&body, || output::say(format_args!("{name} {done}: the drive shows {status}")));
         output::done(said)
     }
 
@@ -145,8 +146,9 @@ impl OneDriveArgs {
             "drive": name.to_string(), "action": "start", "outcome": "confirmed", "text": started.to_string(), "started": started,
             "status": status,
         });
-        let said =
-            self.daemon.say(&body, || output::say(format_args!("{name} {started}: the drive shows {status}")));
+        let said = self
+            .daemon
+            .say(&body, || output::say(format_args!("{name} {started}: the drive shows {status}")));
         output::done(said)
     }
 

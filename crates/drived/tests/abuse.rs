@@ -108,7 +108,8 @@ fn whatever_comes_over_http_statuses_keep_coming_and_a_stop_is_carried_out() {
                 Connection: close\r\n\r\n{}";
     assert_status(&ask(port, form), 415);
     // Who says too much is refused; a stop is one whatever else it says.
-    let head = |target| format!("POST {target} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n");
+    let head =
+        |target| format!("POST {target} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n");
     let piece = format!("10000\r\n{}\r\n", " ".repeat(65_536));
     for (target, status) in [("/api/v1/login", 413), ("/api/v1/drives/pump%202/stop", 200)] {
         let head = head(target);

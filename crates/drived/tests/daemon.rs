@@ -115,6 +115,32 @@ fn a_stop_that_takes_its_time_is_waited_for_without_a_word_of_a_daemon_that_is_s
     assert!(out.contains("pump 1 stands still"), "{out}");
 }
 
+/// A disk that is full, and a reader who has gone: what is confirmed is no alarm for that.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_stop_by_a_daemon_that_is_read_by_nobody_is_the_drives_own_end() {
+    let daemon = Daemon::start("unread", "");
+    for gone in [false, true] {
+        daemon.ask(&["start", "pump 1", "--setpoint", "20Hz"]).assert_done();
+        let unread = || -> std::process::Stdio {
+            if gone {
+                let (_, writer) = std::io::pipe().expect("there is one");
+                return writer.into();
+            }
+            std::fs::OpenOptions::new().write(true).open("/dev/full").expect("it is there").into()
+        };
+        let mut stop = support::drived(&["stop", "pump 1", "--socket", daemon.socket()]);
+        let ended = stop.stdout(unread()).output().expect("the program starts");
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(0), "{said}");
+        assert_eq!(
+            (said.contains("STOP NOT CONFIRMED"), said.contains("cannot be written")),
+            (false, !gone),
+            "{said}"
+        );
+    }
+}
+
 #[test]
 fn a_stop_by_injection_goes_through_the_daemon_with_its_seconds() {
     let daemon = Daemon::start("injection", "");

@@ -38,7 +38,10 @@ fn somebody_else(status: &Status) -> Option<Control> {
 /// Whether an exception may be that of a drive of another family: it has not what was asked for. A busy drive says something else.
 const fn is_of_another(error: &Error) -> bool {
     use ExceptionMeaning::{NoSuchFunction, NoSuchRegister, Refused, ValueRefused};
-    matches!(error, Error::Exception { meaning: NoSuchFunction | NoSuchRegister | Refused | ValueRefused, .. })
+    matches!(
+        error,
+        Error::Exception { meaning: NoSuchFunction | NoSuchRegister | Refused | ValueRefused, .. }
+    )
 }
 
 /// The words that a status shows otherwise than the one before.

@@ -429,7 +429,8 @@ impl Supervisor {
 
     /// The question which drive it is, where only that is wanted to confirm a stop that it has taken, or to give it one of before.
     pub(super) fn stopped_identity_job(&self, now: Instant) -> Option<Job> {
-        let waits = self.stopping.as_ref().is_some_and(|stopping| stopping.taken) || self.owes_stop_of_before();
+        let waits =
+            self.stopping.as_ref().is_some_and(|stopping| stopping.taken) || self.owes_stop_of_before();
         self.checks.identity_job(now).filter(|_| waits && self.link == Link::Connected && !self.unseen)
     }
 

@@ -20,7 +20,9 @@ pub(super) fn commands(drive: &DrivePart) -> Option<String> {
 
 pub(super) fn status(drive: &DrivePart) -> Option<String> {
     let Periods { running, rest, max_age, .. } = drive.settings.periods;
-    Some(format!("every {running:?} running, {rest:?} at rest; lost without one for {max_age:?}, or once its line calls it off-line"))
+    Some(format!(
+        "every {running:?} running, {rest:?} at rest; lost without one for {max_age:?}, or once its line calls it off-line"
+    ))
 }
 
 pub(super) fn measurements(drive: &DrivePart) -> Option<String> {

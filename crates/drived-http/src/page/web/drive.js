@@ -146,7 +146,10 @@ export function drive(root, name) {
     BIG.forEach(([, , of], index) => {
       const group = groupOf(of);
       const ms = group && age(shown[group], shown);
-      const isDated = ms !== undefined && (qualityOf(group) === 'stale' || ms > DATED_FROM_MS);
+      // A status that is read again and again as it was is told anew every few seconds, and at once when it is too old: of a good one its
+      // age counts as it was told.
+      const counted = group === 'status' ? shown.status.age_ms : ms;
+      const isDated = ms !== undefined && (qualityOf(group) === 'stale' || counted > DATED_FROM_MS);
       setText(big[index].children[2], isDated ? old(ms) : '');
     });
   }
