@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, fmt, sync::Arc, time::Duration};
 
-use drive_core::{Command, Direction, Error, Frequency, Refusal, Setpoint, Status, StopMode};
+use drive_core::{Command, Direction, Error, Frequency, Motion, Refusal, Setpoint, Status, StopMode};
 
 use crate::{limits::LimitProblem, stop_order::StopOrder};
 
@@ -271,24 +271,36 @@ pub struct Started {
     /// The setpoint that it uses, as the drive told it with the start; `None` where its words do not hold it.
     #[cfg_attr(feature = "serde", serde(rename = "reference_hz", skip_serializing_if = "Option::is_none"))]
     pub reference: Option<Frequency>,
+    /// Its motor still turned the other way then, and comes down first.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "std::ops::Not::not"))]
+    pub turns_round: bool,
 }
 
 impl Started {
     /// As the status shows it that has confirmed the start.
     pub(crate) fn shown(direction: Direction, status: Option<&Status>) -> Self {
-        Self { direction, reference: status.and_then(|status| status.reference) }
+        let turns =
+            status.filter(|status| status.motion == Motion::Driven).and_then(|status| status.direction);
+        Self {
+            direction,
+            reference: status.and_then(|status| status.reference),
+            turns_round: turns.is_some_and(|turns| turns != direction),
+        }
     }
 }
 
 impl fmt::Display for Started {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "started {}", self.direction)?;
+        if let Some(reference) = self.reference {
+            write!(f, " at {reference}")?;
+        }
+        if self.turns_round {
+            f.write_str(": its motor still turns the other way, and comes down first")?;
+        }
         match self.reference {
-            None => Ok(()),
-            Some(Frequency::ZERO) => {
-                write!(f, " at {}: its setpoint is zero", Frequency::ZERO)
-            }
-            Some(reference) => write!(f, " at {reference}"),
+            Some(Frequency::ZERO) => f.write_str(": its setpoint is zero"),
+            _ => Ok(()),
         }
     }
 }

@@ -201,7 +201,7 @@ pub struct PendingStop {
     pub alarm: bool,
 }
 
-/// An output that is not at the setpoint which the drive says that it has reached.
+/// An output that is not at its setpoint, and comes no nearer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OffSetpoint {
     /// As this fleet gave it, and the drive confirmed it.
@@ -213,12 +213,11 @@ pub struct OffSetpoint {
 impl OffSetpoint {
     /// By a status: further than what the compensation of slip makes of it.
     pub(crate) fn of(setpoint: Option<Setpoint>, status: &Status) -> Option<Self> {
-        let says_so = status.motion == Motion::Driven && status.at_reference == Some(true);
         let (Some(Setpoint::Frequency(setpoint)), Some(output)) = (setpoint, status.output_frequency) else {
             return None;
         };
         let is_off = output.centihertz().abs_diff(setpoint.centihertz()) > NEAR_WITH_SLIP.centihertz();
-        (says_so && is_off).then_some(Self { setpoint, output })
+        is_off.then_some(Self { setpoint, output })
     }
 }
 

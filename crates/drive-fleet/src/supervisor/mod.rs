@@ -12,6 +12,7 @@ mod expiry;
 mod job;
 mod line_lost;
 mod observe;
+mod off_setpoint;
 mod orders;
 mod pace;
 mod permission;
@@ -60,7 +61,7 @@ use crate::{
     limits::Given,
     outcome::{Outcome, Refused, Unknown},
     settings::DriveSettings,
-    snapshot::{Counters, Link, OffSetpoint, Snapshot, Timed, Trip},
+    snapshot::{Counters, Link, Snapshot, Timed, Trip},
 };
 
 /// How many panics of a driver are told that say something else, until its drive is found anew.
@@ -180,10 +181,8 @@ pub(crate) struct Supervisor {
     unmet_told: Option<Refusal>,
     /// A stop of this side has taken the command from somebody else, which is told, and no status has shown it yet.
     stop_took_command: bool,
-    /// Since when the drive says that it is at its reference, and is not at its setpoint.
-    off_since: Option<Instant>,
-    /// The same, once it lasts.
-    off_setpoint: Option<OffSetpoint>,
+    /// Whether its motor comes to its setpoint.
+    off_setpoint: off_setpoint::Watch,
     /// Who has taken control, until it is back.
     control_taken: Option<Control>,
     /// The last job that was sent to change what the motor does, and why.
@@ -256,8 +255,7 @@ impl Supervisor {
             unmet: None,
             unmet_told: None,
             stop_took_command: false,
-            off_since: None,
-            off_setpoint: None,
+            off_setpoint: off_setpoint::Watch::default(),
             control_taken: None,
             acted: None,
             words: Arc::default(),
@@ -656,7 +654,7 @@ impl Supervisor {
             eeprom_worn: self.ledger.is_worn(now),
             exceeded: self.exceeded.values().copied().collect(),
             unmet: self.unmet,
-            off_setpoint: self.off_setpoint,
+            off_setpoint: self.off_setpoint.off(),
             since: self.since.clone(),
             stop: self.stopping.as_ref().map(Stopping::pending),
             lease: self.lease,

@@ -6,10 +6,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use drive_core::{
-    CONFIRMED_WITHIN, Control, Error, ExceptionMeaning, Faults, Measurements, Motion, PortError, Result,
-    Status,
-};
+use drive_core::{Control, Error, ExceptionMeaning, Faults, Measurements, Motion, PortError, Result, Status};
 use tokio::time::Instant;
 
 use super::{Acted, Asker, Job, Supervisor};
@@ -19,7 +16,7 @@ use crate::{
     exceeded::Limit,
     outcome::Refused,
     settings::{OnFault, OnLoss},
-    snapshot::{Link, OffSetpoint, Timed, Trip},
+    snapshot::{Link, Timed, Trip},
 };
 
 /// How many trips are kept for each drive.
@@ -356,13 +353,9 @@ impl Supervisor {
     /// Whether the motor is where the drive says that it is: what it counts its setpoint by may be another than it is taken for. A
     /// setpoint that was just given may not be the one yet of which it says so.
     fn judge_setpoint(&mut self, now: Instant) {
-        let off = self.status.as_ref().and_then(|status| {
-            let given = self.given.filter(|given| given.at < status.at)?;
-            OffSetpoint::of(Some(given.setpoint), &status.value)
-        });
-        let since = off.map(|_| self.off_since.unwrap_or(now));
-        let lasts = since.is_some_and(|since| now.saturating_duration_since(since) >= CONFIRMED_WITHIN);
-        (self.off_since, self.off_setpoint) = (since, off.filter(|_| lasts));
+        let Some(status) = &self.status else { return self.off_setpoint.forget() };
+        let given = self.given.filter(|given| given.at < status.at).map(|given| given.setpoint);
+        self.off_setpoint.see(now, given, &status.value);
     }
 
     /// There is no valid status any more.
@@ -372,7 +365,7 @@ impl Supervisor {
         let silent_for = now.saturating_duration_since(self.silent_since);
         self.emit(EventKind::Lost { silent_for, error: self.last_error.clone() });
         self.given = None;
-        (self.off_since, self.off_setpoint) = (None, None);
+        self.off_setpoint.forget();
         self.acted = None;
         self.explanations = 0;
         self.end_orders_by_loss();

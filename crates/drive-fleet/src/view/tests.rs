@@ -227,10 +227,22 @@ fn an_outcome_is_one_of_seven_words_with_its_reason() {
         assert_eq!(told.get("text").is_some(), word != "confirmed", "{told}");
     }
     is(
-        Outcome::Started(Started { direction: Direction::Forward, reference: Some(Frequency::ZERO) }),
+        Outcome::Started(Started {
+            direction: Direction::Forward,
+            reference: Some(Frequency::ZERO),
+            turns_round: false,
+        }),
         json!({
             "outcome": "confirmed", "started": {"direction": "forward", "reference_hz": 0.0},
             "text": "started forward at 0.00 Hz: its setpoint is zero"
+        }),
+    );
+    let reference = Some(Frequency::from_hertz(20));
+    is(
+        Outcome::Started(Started { direction: Direction::Reverse, reference, turns_round: true }),
+        json!({
+            "outcome": "confirmed", "started": {"direction": "reverse", "reference_hz": 20.0, "turns_round": true},
+            "text": "started reverse at 20.00 Hz: its motor still turns the other way, and comes down first"
         }),
     );
     is(

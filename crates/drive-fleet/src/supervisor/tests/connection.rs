@@ -484,15 +484,41 @@ fn what_is_above_a_limit_that_is_taken_away_or_raised_is_above_none_and_below_a_
     }
 }
 
+/// What is told of an output that is not at its setpoint.
+fn off(rig: &Rig) -> Option<String> {
+    let concerns = rig.snapshot().concerns(rig.now);
+    let told = concerns.into_iter().find(|concern| concern.kind == ConcernKind::OffSetpoint);
+    told.map(|concern| concern.detail.unwrap_or_default())
+}
+
+/// Reverse is inhibited in the drive (a V20's P1110, a WJ200's b035): the motor comes down, and stays there.
+#[test]
+fn a_motor_that_is_driven_and_comes_no_nearer_to_its_setpoint_is_told_once_that_lasts() {
+    let mut rig = Rig::ready();
+    let id = rig.order(run_at(25));
+    rig.pass(500 * MS);
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
+    rig.drive.status.at_reference = Some(false);
+    // 50 Hz in 1000 s.
+    for centihertz in (0..1_500).step_by(5) {
+        rig.drive.status.output_frequency = Some(Frequency::from_centihertz(centihertz));
+        rig.pass(1_000 * MS);
+        assert_eq!(off(&rig), None, "{centihertz}: a slow ramp");
+    }
+    rig.pass(30_000 * MS);
+    assert_eq!(off(&rig).as_deref(), Some("output 14.95 Hz, setpoint 25.00 Hz"));
+    rig.drive.status.output_frequency = Some(Frequency::from_hertz(16));
+    rig.pass(1_000 * MS);
+    assert_eq!(off(&rig), None, "it goes on");
+    rig.drive.status.output_frequency = Some(Frequency::from_hertz(24));
+    rig.pass(60_000 * MS);
+    assert_eq!(off(&rig), None, "slip");
+}
+
 /// 100 % of a G120's setpoint is its p2000 (G120X p. 250), which nobody reads in hertz: at a p2000 of 60 Hz and a full scale of 50 Hz what is
 /// asked as 25 Hz is 30 Hz, and the drive says that it is there.
 #[test]
 fn a_drive_that_is_at_its_reference_and_not_at_its_setpoint_is_told_once_that_lasts() {
-    let off = |rig: &Rig| {
-        let concerns = rig.snapshot().concerns(rig.now);
-        let told = concerns.into_iter().find(|concern| concern.kind == ConcernKind::OffSetpoint);
-        told.map(|concern| concern.detail.unwrap_or_default())
-    };
     let mut rig = Rig::ready();
     let id = rig.order(run_at(25));
     rig.pass(500 * MS);

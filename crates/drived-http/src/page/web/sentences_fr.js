@@ -343,8 +343,8 @@ const PATTERNS = [
   [/^(?:input )?(\w+) by its function forced run \((F\d+) = 53\)$/, (input, code) => `${input} par sa fonction marche forcée (${code} = 53)`],
   [/^switch it off, or give (F\d+) another function$/, code => `l’ouvrir, ou donner à ${code} une autre fonction`],
   [/^(?:input )?(\w+), which is on, with the terminals in command once FA00 is 0,$/, input => `${input}, qui est fermée, le bornier commandant dès que FA00 vaut 0,`],
-  [/^started (forward|reverse)(?: at ([\d.]+ Hz))?(: its setpoint is zero)?$/, (way, at, zero) =>
-    `démarré en ${way === 'forward' ? 'avant' : 'arrière'}${at ? ` à ${number(at)}` : ''}${zero ? ' : sa consigne est nulle' : ''}`],
+  [/^started (forward|reverse)(?: at ([\d.]+ Hz))?(: its motor still turns the other way, and comes down first)?(: its setpoint is zero)?$/, (way, at, round, zero) =>
+    `démarré en ${way === 'forward' ? 'avant' : 'arrière'}${at ? ` à ${number(at)}` : ''}${round ? ' : le moteur tourne encore dans l’autre sens et ralentit d’abord' : ''}${zero ? ' : sa consigne est nulle' : ''}`],
   [/^setpoint (.+?): (.+)$/, (setpoint, why) => `consigne ${number(setpoint)} : ${french(why)}`],
   [/^(.+) decides instead: (.+)$/, (by, remedy) => `${french(by)} décide à la place : ${french(remedy)}`],
   [/^(.+): switch (\w+) off, or accept it by name \(accept-self-restart \w+\)$/, (what, code) => `${french(what)} : désactiver ${code}, ou l’accepter par son nom (accept-self-restart ${code})`],

@@ -157,7 +157,7 @@ const TABLE = {
   concern_restarts_itself: ['its own settings start the motor again by themselves', 'ses propres réglages redémarrent le moteur seuls'],
   concern_eeprom_worn: ['its EEPROM is written more often than it lasts', 'son EEPROM est écrite plus souvent qu’elle ne dure'],
   concern_limit_exceeded: ['above its limit', 'au-dessus de sa limite'],
-  concern_off_setpoint: ['the drive says that it is at its reference, and its output is not at its setpoint', 'le variateur dit être à sa référence, et sa sortie n’est pas à sa consigne'],
+  concern_off_setpoint: ['the output is not at its setpoint, and comes no nearer', 'la sortie n’est pas à sa consigne, et ne s’en approche plus'],
   concern_warning: ['the drive shows an alarm', 'le variateur montre une alarme'],
   concern_control_taken: ['somebody else has taken control', 'quelqu’un d’autre a pris la commande'],
   concern_stop_pending: ['a stop is on its way, not confirmed yet', 'un arrêt est en cours, pas encore confirmé'],
