@@ -117,6 +117,10 @@ impl Teller {
         cause: &Cause,
         outcome: &Outcome,
     ) {
+        // How it was found is told before what became of a command to it.
+        for fate in [Fate::Connected, Fate::Back] {
+            self.tell_waiting(drive, fate);
+        }
         let at_exit = matches!(cause, Cause::Policy { policy: Policy::Exit | Policy::Removal });
         let mine = |what: &What| match (what, command) {
             (What::FaultCleared, Command::ResetFaults) => outcome.is_confirmed(),

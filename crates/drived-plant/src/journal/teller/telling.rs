@@ -22,10 +22,7 @@ impl Teller {
         said: String,
     ) {
         // Its loss is told before its return.
-        let lost = (self.line_of(drive), Fate::Lost);
-        if self.together.get(&lost).is_some_and(|all| all.drives.iter().any(|(name, _)| name == drive)) {
-            self.tell_together(lost);
-        }
+        self.tell_waiting(drive, Fate::Lost);
         let with_line = std::mem::take(&mut self.state(drive).with_line);
         if with_line || self.together.contains_key(&(self.line_of(drive), Fate::Back)) {
             self.share(now, drive, Fate::Back, level, after, said);
@@ -100,6 +97,14 @@ impl Teller {
         all.drives.push((Arc::clone(drive), said));
     }
 
+    /// What is to be told of this drive together with others is told now: something of it that came behind is told next.
+    pub(super) fn tell_waiting(&mut self, drive: &Arc<str>, fate: Fate) {
+        let key = (self.line_of(drive), fate);
+        if self.together.get(&key).is_some_and(|all| all.drives.iter().any(|(name, _)| name == drive)) {
+            self.tell_together(key);
+        }
+    }
+
     pub(super) fn tell_together(&mut self, key: (usize, Fate)) {
         let Some(Together { level, longest, mut drives, .. }) = self.together.remove(&key) else { return };
         let (index, fate) = key;
@@ -141,7 +146,28 @@ impl Teller {
 
 #[cfg(test)]
 mod tests {
+    use drive_core::{Command, StopMode};
+    use drive_fleet::{Cause, Outcome};
+
     use super::*;
+
+    /// "connected: running" behind "stop: confirmed" is no order for who was called in the night.
+    #[test]
+    fn how_a_drive_was_found_is_told_before_what_became_of_a_command_to_it() {
+        let (now, name) = (Instant::now(), Arc::<str>::from("pump 1"));
+        let mut teller = Teller::new(now);
+        teller.handle_members(now, "north", vec![(Arc::clone(&name), 1)]);
+        for (fate, found) in [(Fate::Connected, "connected"), (Fate::Back, "back after up to 0.0 s")] {
+            teller.share(now, &name, fate, Level::INFO, Duration::ZERO, "running at 30 Hz".to_owned());
+            let stop = Command::Stop(StopMode::Ramp);
+            teller.commanded(now, &name, &stop, "local", &Cause::Found, &Outcome::Confirmed);
+            let told: Vec<String> =
+                std::iter::from_fn(|| teller.poll_entry()).map(|entry| entry.text).collect();
+            assert_eq!(told.len(), 2, "{told:?}");
+            assert!(told[0].contains(found) && told[0].contains("running at 30 Hz"), "{told:?}");
+            assert!(told[1].contains("confirmed"), "{told:?}");
+        }
+    }
 
     /// Behind a standstill of the program all are lost and back within a moment.
     #[test]
