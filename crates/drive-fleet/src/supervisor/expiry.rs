@@ -52,6 +52,9 @@ pub(crate) struct Lifetime {
 }
 
 impl Lifetime {
+    /// It waits for as long as a stop does.
+    pub(super) const FOR_A_STOP: Self = Self { call: None, all: None, is_for_a_stop: true };
+
     /// A part of it is over already.
     pub(crate) fn without(self, time: Duration) -> Self {
         let less = |left: Option<Duration>| left.map(|left| left.saturating_sub(time));

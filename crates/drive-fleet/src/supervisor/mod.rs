@@ -413,9 +413,10 @@ impl Supervisor {
     fn lifetime(&self, now: Instant, job: Job) -> Lifetime {
         match job {
             // Which drive it is decides whether a stop of before is its own: it is looked for as the stop itself would be given.
-            Job::Status { .. } | Job::Identify if self.owes_stop_of_before() => {
-                Lifetime { is_for_a_stop: true, ..Lifetime::default() }
+            Job::Status { .. } if self.owes_stop_of_before() && self.link != Link::Connected => {
+                Lifetime::FOR_A_STOP
             }
+            Job::Identify if self.owes_stop_of_before() => Lifetime::FOR_A_STOP,
             Job::Status { .. } => {
                 Lifetime { call: Some(self.pace.until_next(now, self.is_busy())), ..Lifetime::default() }
             }
