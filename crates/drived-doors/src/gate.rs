@@ -1,10 +1,14 @@
 //! What every request passes, by whichever door it came: whom it was meant for, who asks, how much he says, and the audit
 //! log; then the router.
 
+mod body;
+mod caller;
+mod door;
+mod login;
+
 use std::{
     net::IpAddr,
-    pin::pin,
-    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
+    sync::{Arc, Mutex, OnceLock},
     time::Duration,
 };
 
@@ -12,55 +16,49 @@ use axum::{
     Router,
     body::{Body, Bytes},
     http::{
-        HeaderMap, HeaderValue, Method, Request, StatusCode, Version,
+        HeaderMap, HeaderValue, Method, Request, StatusCode,
         header::{self, HeaderName},
-        request::Parts,
     },
     response::Response,
 };
-use http_body_util::{BodyExt as _, LengthLimitError, Limited};
+use http_body_util::BodyExt as _;
 use hyper::body::Body as _;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use tokio::{
     runtime::Handle,
     sync::watch,
     task::JoinSet,
-    time::{Instant, sleep, timeout, timeout_at},
+    time::{Instant, sleep, timeout},
 };
 use tower::ServiceExt as _;
 
+pub use self::login::{LoginBody, MadeLink, NewLink, SessionView};
+use self::{
+    body::{BODY, BODY_OF_NOBODY_WITHIN, BODY_WITHIN, LOGIN_BODY, STOP_WITHIN, read, what_comes},
+    caller::lock,
+    door::freely,
+};
+pub(super) use self::{
+    door::{Door, Peer},
+    login::link,
+};
 use super::{
     audit::{Audit, Kind, Record, bounded},
     authority::Authority,
-    codes::{self, Codes, Grant},
+    codes::Codes,
     crowd::Asking,
     failures::Failures,
-    host::{self, Hosts},
+    host,
     kept::Kept,
-    network::Network,
     pace::Pace,
     refusal::Refusal,
-    sessions::{self, Sessions},
+    sessions::Sessions,
     threads::Threads,
     token_desk,
-    tokens::{self, Token, TokenError, Tokens},
+    tokens::Tokens,
 };
-use drived_config::{
-    kept::sha256,
-    rights::{Caller, Rights, Role},
-};
-use drived_words::json::line;
+use drived_config::rights::Rights;
 
-/// The most that a request may say.
-const BODY: usize = 64 * 1024;
-/// The most that whoever begins a session may say.
-const LOGIN_BODY: usize = 4 * 1024;
-/// How long whoever has brought a right token may take to say it, and whoever has not.
-const BODY_WITHIN: Duration = Duration::from_secs(10);
-const BODY_OF_NOBODY_WITHIN: Duration = Duration::from_secs(1);
-/// How long a stop may take to say how: whoever is cut off in the middle of it has asked for one.
-const STOP_WITHIN: Duration = Duration::from_millis(250);
 /// How long an answer may take to begin: the longest wait for a command, and 10 s.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(40);
 
@@ -70,118 +68,10 @@ pub const LOGOUT: &str = "/api/v1/logout";
 /// Where links are made by which a browser begins a session, over the control socket.
 pub const LINKS: &str = "/api/v1/links";
 
-/// By which a session begins: one of the two.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LoginBody {
-    token: Option<String>,
-    /// A code of `drived token link`, which is good once.
-    code: Option<String>,
-}
-
-/// A link that is wished for.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct NewLink {
-    /// The token by whose name and rights the browser is known.
-    name: String,
-    /// What it may, if there is no such token when the link is used.
-    #[serde(default)]
-    role: Option<Role>,
-    /// For how many days that one is good then; 1 unless it is said.
-    #[serde(default)]
-    days: Option<u32>,
-}
-
-/// A link by which a browser begins a session, once.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-pub struct MadeLink {
-    pub name: String,
-    pub link: String,
-    pub good_for_s: u64,
-}
-
-/// The address at which the page begins a session. What stands behind `#` is sent to nobody by a browser.
-pub(super) fn link(page: &str, code: &str) -> String {
-    format!("{page}#/enter/{code}")
-}
-
-/// Who somebody is.
-#[derive(Serialize, JsonSchema)]
-pub struct SessionView {
-    caller: String,
-    rights: Rights,
-}
-
 /// When a request came, in its extensions: before its body was read, and before a disk was waited for. What it asks expires from then
 /// on, and a stop that comes meanwhile came after it.
 #[derive(Debug, Clone, Copy)]
 pub struct Arrived(pub Instant);
-
-/// What holds for one door.
-#[derive(Debug, Clone)]
-pub(super) struct Door {
-    pub(super) hosts: Hosts,
-    /// What is given to those who bring no token.
-    pub(super) freely: Rights,
-    /// The same, where a proxy stands between.
-    pub(super) through_a_proxy: Rights,
-    /// Those who say truly for whom they ask.
-    pub(super) proxies: Vec<Network>,
-    pub(super) encrypted: bool,
-}
-
-/// What a proxy adds to what it passes on.
-const OF_PROXIES: [&str; 10] = [
-    "forwarded",
-    "x-forwarded-for",
-    "x-forwarded-host",
-    "x-forwarded-port",
-    "x-forwarded-proto",
-    "x-forwarded-server",
-    "x-real-ip",
-    "via",
-    "cf-connecting-ip",
-    "true-client-ip",
-];
-
-impl Door {
-    /// Who asks, and whether through a proxy. Of one that is not named nothing is believed but that it is one.
-    fn whose(&self, peer: Peer, version: Version, headers: &HeaderMap) -> (Peer, bool) {
-        let Peer::Address(address) = peer else { return (peer, false) };
-        let is_named = |address: IpAddr| self.proxies.iter().any(|network| network.has(address));
-        if !is_named(address) {
-            // No browser and none of ours speaks the older one; proxies do where they are not told otherwise.
-            let proxied =
-                version == Version::HTTP_10 || OF_PROXIES.into_iter().any(|name| headers.contains_key(name));
-            return (peer, proxied);
-        }
-        // Each proxy adds whom it heard behind what it was told: the last that is none of ours is believed.
-        let all = headers.get_all("x-forwarded-for").iter().filter_map(|said| said.to_str().ok());
-        let said: Vec<IpAddr> =
-            all.flat_map(|said| said.split(',')).map_while(|one| one.trim().parse().ok()).collect();
-        let of_them =
-            said.into_iter().rev().map(|one: IpAddr| one.to_canonical()).find(|one| !is_named(*one));
-        (Peer::Address(of_them.unwrap_or(address)), true)
-    }
-}
-
-/// The far end of a connection.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Peer {
-    Address(IpAddr),
-    /// A user of this machine on the socket.
-    User(Option<u32>),
-}
-
-impl Peer {
-    pub(super) const fn address(self) -> Option<IpAddr> {
-        match self {
-            Self::Address(address) => Some(address),
-            Self::User(_) => None,
-        }
-    }
-}
 
 /// The checks, and what lies behind them.
 pub(super) struct Gate {
@@ -418,354 +308,12 @@ impl Gate {
         self.audit.record(Record { id, outcome, status: Some(parts.status.as_u16()), ..record }).whenever();
         Ok(Response::from_parts(parts, Body::from(body)))
     }
-
-    /// Tokens are made where those stand who have every right without one.
-    async fn tokens_for(
-        &self,
-        peer: Peer,
-        caller: &Caller,
-        what: (&Method, Option<&str>),
-        body: &[u8],
-    ) -> Result<Response, Refusal> {
-        if drive_fleet::mutant!("tokens-over-the-network", peer.address().is_some(), false)
-            || !caller.rights.engineer
-        {
-            return Err(Refusal::new(
-                StatusCode::FORBIDDEN,
-                "tokens are made and removed over the control socket",
-            ));
-        }
-        let Some(tokens) = &self.tokens else {
-            return Err(Refusal::new(StatusCode::NOT_FOUND, "this daemon keeps no tokens"));
-        };
-        let answer = token_desk::answer(Arc::clone(tokens), &self.audit, caller, what, body).await;
-        if let (&(&Method::PUT | &Method::DELETE), Some(name)) = (&what.0, what.1) {
-            self.codes.drop_of(name);
-        }
-        self.changes.send_replace(());
-        answer
-    }
-
-    /// Whether what somebody was let in by is so still.
-    pub(super) fn holds(&self, authority: &Authority) -> bool {
-        let of_hash = |hash: &str, role: Role| {
-            let token = self.tokens.as_ref().and_then(|tokens| tokens.of_hash(hash).ok().flatten());
-            drive_fleet::mutant!("removed-token-holds", token.is_some_and(|token| token.role == role), true)
-        };
-        match authority {
-            Authority::Freely => true,
-            Authority::Token { sha256, role } => of_hash(sha256, *role),
-            Authority::Session { secret, sha256, role } => {
-                let is_begun = self.sessions.token(secret, Instant::now()).as_ref() == Some(sha256);
-                is_begun && of_hash(sha256, *role)
-            }
-        }
-    }
-
-    /// Who asks, and by what he is let in. A token that is wrong is never taken for none.
-    fn caller(
-        &self,
-        without: Caller,
-        peer: Peer,
-        headers: &HeaderMap,
-        stops: bool,
-    ) -> Result<(Caller, Authority), Refusal> {
-        match self.bearer(peer, headers, stops, &without) {
-            // A file of tokens that cannot be read keeps nobody from a stop that needs none.
-            Err(Unlet::Unreadable(_)) if stops && without.rights.stop => Ok((without, Authority::Freely)),
-            Err(Unlet::Unreadable(error)) => Err(unreadable(error)),
-            Err(Unlet::Refused(refusal)) => Err(refusal),
-            Ok(None) => Ok((without, Authority::Freely)),
-            Ok(Some((token, authority))) => Ok((of_token(&token, without), authority)),
-        }
-    }
-
-    /// The token by which somebody comes, if any.
-    fn bearer(
-        &self,
-        peer: Peer,
-        headers: &HeaderMap,
-        stops: bool,
-        without: &Caller,
-    ) -> Result<Option<(Token, Authority)>, Unlet> {
-        let Some(authorization) = headers.get(header::AUTHORIZATION) else {
-            // A session that is over is no wrong token: who had it is anybody again, and the page says so.
-            let Some(secret) = sessions::cookie(headers) else { return Ok(None) };
-            let hash = self.sessions.token(secret, Instant::now());
-            let (Some(sha256), Some(tokens)) = (hash, &self.tokens) else { return Ok(None) };
-            let token = if stops { tokens.of_hash_for_stop(&sha256) } else { tokens.of_hash(&sha256) }?;
-            let secret = secret.to_owned();
-            return Ok(token.map(|token| {
-                let role = token.role;
-                (token, Authority::Session { secret, sha256, role })
-            }));
-        };
-        // Whoever has a right token stops his motors, whatever others do at the same address.
-        if drive_fleet::mutant!("guessing-keeps-a-stop-out", !stops, true) {
-            self.wait(peer).map_err(Unlet::Refused)?;
-        }
-        let secret = authorization.to_str().ok().and_then(|text| text.split_once(' '));
-        let secret = secret
-            .filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"))
-            .map(|(_, secret)| secret.trim());
-        let find = |secret: &str| match &self.tokens {
-            Some(tokens) if stops => tokens.of_hash_for_stop(&sha256(secret.as_bytes())),
-            _ => self.token(secret),
-        };
-        match secret.map(find).transpose()?.flatten() {
-            Some(token) => {
-                // By that which was brought: it may end before the one that has replaced it.
-                let sha256 = sha256(secret.unwrap_or_default().as_bytes());
-                let authority = Authority::Token { sha256, role: token.role };
-                Ok(Some((token, authority)))
-            }
-            None => drive_fleet::mutant!(
-                "wrong-token-is-none",
-                Err(Unlet::Refused(self.failed(peer, without))),
-                Ok(None)
-            ),
-        }
-    }
-
-    fn token(&self, secret: &str) -> Result<Option<Token>, TokenError> {
-        self.tokens.as_ref().map_or(Ok(None), |tokens| tokens.find(secret))
-    }
-
-    async fn log_in(
-        &self,
-        door: &Door,
-        peer: Peer,
-        caller: Caller,
-        body: &[u8],
-    ) -> Result<Response, Refusal> {
-        const EXPECTED: &str = "{\"token\": \"drv_…\"} or {\"code\": …}";
-        self.wait(peer)?;
-        let known = match token_desk::read(body, EXPECTED)? {
-            LoginBody { token: Some(secret), code: None } => {
-                let secret = secret.trim();
-                let token = self.token(secret).map_err(unreadable)?;
-                token.map(|token| (token, sha256(secret.as_bytes())))
-            }
-            LoginBody { token: None, code: Some(code) } => self.by_code(code.trim(), &caller).await?,
-            LoginBody { .. } => {
-                return Err(Refusal::new(StatusCode::BAD_REQUEST, format!("expected {EXPECTED}")));
-            }
-        };
-        let Some((token, hash)) = known else {
-            return Err(self.failed(peer, &caller));
-        };
-        let session = tokens::new_secret().map_err(unreadable)?;
-        self.sessions.begin(&session, &hash, Instant::now());
-        let caller = of_token(&token, caller);
-        self.audit.record(Record::new(Kind::Login, &caller, "login")).whenever();
-        Ok(told(&caller, Some(&session), door.encrypted))
-    }
-
-    /// The token of whom a code is for, and its hash. The code is none from then on.
-    async fn by_code(&self, code: &str, caller: &Caller) -> Result<Option<(Token, String)>, Refusal> {
-        let Some(Grant { name, right }) = self.codes.take(code, Instant::now()) else { return Ok(None) };
-        let Some(tokens) = self.tokens.clone() else { return Ok(None) };
-        let made = token_desk::changed(&tokens, name, move |tokens, name| {
-            // Whoever it is for may have lost his token since: then it is good no more.
-            match tokens.for_session(name, &right) {
-                Err(TokenError::Unknown { .. }) => Ok(None),
-                made => made.map(Some),
-            }
-        });
-        let Some((token, is_new)) = made.await? else { return Ok(None) };
-        if is_new {
-            let what = token_desk::added(&token.name, token.role, None);
-            token_desk::kept_or_removed(
-                &tokens,
-                &self.audit,
-                Record::new(Kind::Token, caller, what),
-                &token.name,
-            )
-            .await?;
-        }
-        let hash = token.sha256.clone();
-        Ok(Some((token, hash)))
-    }
-
-    /// Makes a link for whoever has every right without one.
-    async fn link_for(&self, peer: Peer, caller: &Caller, body: &[u8]) -> Result<Response, Refusal> {
-        if peer.address().is_some() || !caller.rights.engineer {
-            return Err(Refusal::new(StatusCode::FORBIDDEN, "links are made over the control socket"));
-        }
-        let NewLink { name, role, days } = token_desk::read(body, "{\"name\": …, \"role\": …}")?;
-        let Some(tokens) = &self.tokens else {
-            return Err(Refusal::new(StatusCode::NOT_FOUND, "this daemon keeps no tokens"));
-        };
-        let unusable = |why| Err(Refusal::new(StatusCode::UNPROCESSABLE_ENTITY, why));
-        if days == Some(0) {
-            return unusable("0 days: expected 1 or more".to_owned());
-        }
-        let right = match tokens.right_of(&name, role.map(|role| (role, days.unwrap_or(1)))) {
-            Err(TokenError::Unknown { .. }) => {
-                let why = format!(
-                    "there is no token {name:?} that is good: a role makes one when the link is used"
-                );
-                return unusable(why);
-            }
-            right => right.map_err(token_desk::refused)?,
-        };
-        let grant = Grant { name: name.clone(), right };
-        let Some(page) = self.page.get() else {
-            return Err(Refusal::new(StatusCode::NOT_FOUND, "this daemon serves no page"));
-        };
-        let written = self.audit.record(Record::new(Kind::Token, caller, format!("link for {name}")));
-        if let Err(error) = written.done().await {
-            return Err(Refusal::new(StatusCode::SERVICE_UNAVAILABLE, error.to_string()));
-        }
-        let code = self.codes.make(grant, Instant::now()).map_err(unreadable)?;
-        let made = MadeLink { name, link: link(page, &code), good_for_s: codes::LASTS.as_secs() };
-        let mut answer = Response::new(Body::from(line(&made)));
-        answer.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));
-        Ok(answer)
-    }
-
-    fn log_out(&self, door: &Door, caller: &Caller, headers: &HeaderMap) -> Response {
-        if let Some(session) = sessions::cookie(headers) {
-            // Whoever may see may say any cookie: only the end of a session that was there is written and told.
-            if self.sessions.end(session) {
-                self.changes.send_replace(());
-            }
-        }
-        self.audit.record(Record::new(Kind::Logout, caller, "logout")).whenever();
-        told(caller, None, door.encrypted)
-    }
-
-    /// Whether tokens of this address are looked at.
-    fn wait(&self, peer: Peer) -> Result<(), Refusal> {
-        if peer.address().is_none() {
-            return Ok(());
-        }
-        match lock(&self.failures).wait(&peer.address(), Instant::now()) {
-            None => Ok(()),
-            Some(wait) => {
-                let why = "too many wrong tokens from this address";
-                Err(Refusal::new(StatusCode::TOO_MANY_REQUESTS, why).after(wait))
-            }
-        }
-    }
-
-    /// A wrong token has come. Of many only some are told.
-    fn failed(&self, peer: Peer, caller: &Caller) -> Refusal {
-        if let Some(untold) = lock(&self.failures).count(&peer.address(), Instant::now()) {
-            let what = and_before("a wrong token", untold);
-            tracing::warn!("{what} from {}", caller.origin);
-            self.audit.record_refused(Record::new(Kind::LoginFailed, caller, what));
-        }
-        Refusal::unauthorized("the token is wrong")
-    }
-
-    /// Somebody has asked for what he may not do. Of many only some are told.
-    fn note_refused(&self, caller: &Caller, asked: &Parts) {
-        let who = format!("{} {}", caller.name, caller.origin);
-        if let Some(untold) = lock(&self.refused).count(&who, Instant::now()) {
-            let what = and_before(&format!("{} {}", asked.method, asked.uri.path()), untold);
-            self.audit.record_refused(Record::new(Kind::Refused, caller, what));
-        }
-    }
-}
-
-/// What is told, and how often it has been so without being told.
-fn and_before(what: &str, untold: u64) -> String {
-    match untold {
-        0 => what.to_owned(),
-        untold => format!("{what}, and {untold} before that were not told"),
-    }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn unreadable(error: TokenError) -> Refusal {
-    tracing::error!(%error, "no token can be looked at");
-    Refusal::new(StatusCode::SERVICE_UNAVAILABLE, "no token can be looked at: see the log of the daemon")
-}
-
-/// Whoever brings no token.
-fn freely(door: &Door, peer: Peer, proxied: bool, headers: &HeaderMap) -> Caller {
-    let browser = headers.contains_key("sec-fetch-site") || headers.contains_key(header::COOKIE);
-    let (name, origin) = match peer {
-        Peer::Address(address) => {
-            ("anonymous", format!("{} {}", if browser { "page" } else { "http" }, address.to_canonical()))
-        }
-        Peer::User(Some(uid)) => ("local", format!("socket uid {uid}")),
-        Peer::User(None) => ("local", "socket".to_owned()),
-    };
-    Caller::new(name, origin, if proxied { door.through_a_proxy } else { door.freely })
-}
-
-fn of_token(token: &Token, without: Caller) -> Caller {
-    let rights = token.role.rights();
-    // Nobody stops less because he has said who he is.
-    let stop = rights.stop || without.rights.stop;
-    let rights = Rights { stop, ..rights };
-    Caller { name: token.name.clone(), rights, scope: token.scope.clone(), ..without }
-}
-
-/// Why somebody is not let in.
-enum Unlet {
-    Refused(Refusal),
-    /// Who he is cannot be looked at.
-    Unreadable(TokenError),
-}
-
-impl From<TokenError> for Unlet {
-    fn from(error: TokenError) -> Self {
-        Self::Unreadable(error)
-    }
 }
 
 /// Whether a path is one of those that a router has at this address: what stands in braces is any level.
 fn fits(address: &str, path: &str) -> bool {
     let fits = |(level, said): (&str, &str)| level == said || level.starts_with('{') && !said.is_empty();
     address.split('/').count() == path.split('/').count() && address.split('/').zip(path.split('/')).all(fits)
-}
-
-/// The body of a request, as far as it may go.
-async fn read<B>(body: B, limit: usize, within: Duration) -> Result<Bytes, Refusal>
-where
-    B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
-{
-    match timeout(within, Limited::new(body, limit).collect()).await {
-        Ok(Ok(body)) => Ok(body.to_bytes()),
-        Ok(Err(error)) if error.is::<LengthLimitError>() => {
-            Err(Refusal::new(StatusCode::PAYLOAD_TOO_LARGE, format!("this may say {} KiB", limit >> 10)))
-        }
-        Ok(Err(_)) => Err(Refusal::new(StatusCode::BAD_REQUEST, "the request ended before its end")),
-        Err(_) => Err(Refusal::new(StatusCode::REQUEST_TIMEOUT, "the request took too long")),
-    }
-}
-
-/// What has come of a body within a time, as far as it may go.
-async fn what_comes<B>(body: B, limit: usize, within: Duration) -> Bytes
-where
-    B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
-{
-    let (mut body, mut came, until) = (pin!(body), Vec::new(), Instant::now() + within);
-    while came.len() < limit
-        && let Ok(Some(Ok(frame))) = timeout_at(until, body.frame()).await
-    {
-        let room = limit - came.len();
-        came.extend(frame.data_ref().into_iter().flatten().take(room));
-    }
-    came.into()
-}
-
-/// Who the caller is now, and his cookie.
-fn told(caller: &Caller, session: Option<&str>, encrypted: bool) -> Response {
-    let known = SessionView { caller: caller.name.clone(), rights: caller.rights };
-    let mut answer = Response::new(Body::from(line(&known)));
-    let headers = answer.headers_mut();
-    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));
-    if let Ok(cookie) = sessions::set_cookie(session, encrypted).parse() {
-        headers.insert(header::SET_COOKIE, cookie);
-    }
-    answer
 }
 
 /// What a browser is told about every answer.
