@@ -1,7 +1,7 @@
 //! What the manuals say of each family that its capabilities do not: control word, status word, exceptions.
 
 use drive_core::ExceptionMeaning::{
-    self, Accepted, Busy, Failed, NoSuchFunction, NoSuchRegister, NotNow, ValueRefused,
+    self, Accepted, Busy, Failed, NoSuchFunction, NoSuchRegister, NotNow, Refused, ValueRefused,
 };
 use drive_families::Family;
 use drive_testing::{
@@ -109,13 +109,23 @@ fn exceptions(family: Family) -> &'static [(u8, ExceptionMeaning)] {
     match five(family) {
         Five::Atv21 => &[(1, NoSuchFunction), (2, NoSuchRegister), (3, ValueRefused), (4, NotNow)],
         // Their manuals list 1 to 4 as the Modbus specification has them; 5 and 6 are the specification's.
-        Five::Atv28 | Five::Atv58 | Five::Atv312 => &[
+        Five::Atv28 | Five::Atv312 => &[
             (1, NoSuchFunction),
             (2, NoSuchRegister),
             (3, ValueRefused),
             (4, Failed),
             (5, Accepted),
             (6, Busy),
+        ],
+        // And UNI-TE's negative reply, p. 13/37.
+        Five::Atv58 => &[
+            (1, NoSuchFunction),
+            (2, NoSuchRegister),
+            (3, ValueRefused),
+            (4, Failed),
+            (5, Accepted),
+            (6, Busy),
+            (0xFD, Refused),
         ],
         Five::Omron3g3ev => &[
             (1, NoSuchFunction),

@@ -193,8 +193,6 @@ const fn meaning(_function: u8, code: u8) -> ExceptionMeaning {
         0x01 => ExceptionMeaning::NoSuchFunction,
         0x02 => ExceptionMeaning::NoSuchRegister,
         0x03 | 0x21 => ExceptionMeaning::ValueRefused,
-        // A gateway's.
-        0x0A => ExceptionMeaning::NoPath,
         0x22 => ExceptionMeaning::NotNow,
         _ => ExceptionMeaning::Unknown,
     }

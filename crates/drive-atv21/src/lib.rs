@@ -271,8 +271,6 @@ const fn meaning(_function: u8, code: u8) -> ExceptionMeaning {
         2 => ExceptionMeaning::NoSuchRegister,
         3 => ExceptionMeaning::ValueRefused,
         4 => ExceptionMeaning::NotNow,
-        // A gateway's.
-        0x0A => ExceptionMeaning::NoPath,
         _ => ExceptionMeaning::Unknown,
     }
 }

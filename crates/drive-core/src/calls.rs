@@ -560,7 +560,7 @@ impl<P: Port> Calls<'_, P> {
     }
 
     fn exception(&self, exchange: Exchange, code: u8) -> Error {
-        let meaning = (self.registers.meaning)(exchange.function, code);
+        let meaning = (self.registers.meaning)(exchange.function, code).or_of_a_gateway(code);
         Error::Exception { slave: self.registers.slave, exchange, code, meaning }
     }
 

@@ -80,7 +80,7 @@ pub enum ExceptionMeaning {
 }
 
 impl ExceptionMeaning {
-    /// What the Modbus specification says of the codes 1 to 6 and 0Ah, for families whose manual says the same.
+    /// What the Modbus specification says of the codes 1 to 6, for families whose manual says the same.
     #[must_use]
     pub const fn standard(code: u8) -> Self {
         match code {
@@ -90,8 +90,16 @@ impl ExceptionMeaning {
             4 => Self::Failed,
             5 => Self::Accepted,
             BUSY => Self::Busy,
-            0x0A => Self::NoPath,
             _ => Self::Unknown,
+        }
+    }
+
+    /// The same, where it means nothing on a drive and is what a gateway says.
+    #[must_use]
+    pub const fn or_of_a_gateway(self, code: u8) -> Self {
+        match (self, code) {
+            (Self::Unknown, 0x0A) => Self::NoPath,
+            _ => self,
         }
     }
 
