@@ -5,7 +5,7 @@ use std::time::Duration;
 use drive_bus::{Line, LineConfig};
 use drive_core::{Direction, Drive, Frequency, Motion, Status, StopMode};
 use drive_families::Options;
-use drive_fleet::{Order, Until};
+use drive_fleet::{DriveHandle, Order, Until};
 use drive_profile::format::Reached;
 use tokio::time::{Instant, sleep};
 
@@ -25,6 +25,12 @@ const AT_THE_PANEL: Duration = Duration::from_secs(60);
 
 /// From one look to the next.
 const LOOK: Duration = Duration::from_millis(250);
+
+/// How far from the setpoint an output may be that is at it, and above which it is not the one that was given.
+const NEAR: Frequency = Frequency::from_hertz(1);
+const ABOVE: Frequency = Frequency::from_hertz(2);
+/// How long it stays there before anybody is asked.
+const STAYS_FOR: Duration = Duration::from_secs(3);
 
 /// A drive on its line, and what its owner says of it.
 pub(super) struct Steps {
@@ -169,10 +175,21 @@ impl Steps {
         };
         // The motor runs by this program: nothing leads from here but by the stop, neither a terminal that is gone nor Ctrl-C.
         let said = console.say(format_args!("{started}: the drive shows {status}"));
+        let drive = one.handle();
+        let question =
+            format!("Does the panel show {}, and does the motor turn that slowly, forward?", self.lowest);
+        let looks = async {
+            self.comes_to_it(&drive).await?;
+            tokio::select! {
+                biased;
+                output = self.runs_away(&drive) => Err(self.is_not_it(output)),
+                turns = console.agrees(&question) => turns,
+            }
+        };
         let turns = tokio::select! {
             biased;
             () = one.asked_to_end() => Err(asked_to_end()),
-            turns = console.agrees("Does the motor turn slowly, forward?") => turns,
+            turns = looks => turns,
         };
         let Stop { status, .. } = one.stop(StopMode::Ramp).await?;
         said?;
@@ -185,6 +202,45 @@ impl Steps {
             "a start at {} turned the uncoupled motor forward, and a stop stopped it",
             self.lowest
         )))
+    }
+
+    /// The motor comes to the setpoint, as far as the drive tells its output. A scale of the profile that is not the drive's shows here
+    /// and nowhere before: what was written reads back by the same scale.
+    async fn comes_to_it(&self, drive: &DriveHandle) -> Result<(), Failure> {
+        let (until, mut there_since) = (Instant::now() + AT_THE_PANEL, None);
+        while let Some(output) = output_of(drive) {
+            if output > self.lowest.saturating_add(ABOVE) || Instant::now() >= until {
+                return Err(self.is_not_it(output));
+            }
+            let is_there = output >= self.lowest.saturating_sub(NEAR);
+            there_since = is_there.then(|| there_since.unwrap_or_else(Instant::now));
+            // One that goes on passes it within that.
+            if there_since.is_some_and(|since| since.elapsed() >= STAYS_FOR) {
+                break;
+            }
+            sleep(LOOK).await;
+        }
+        Ok(())
+    }
+
+    /// Ends when the motor turns faster than it may by what was given.
+    async fn runs_away(&self, drive: &DriveHandle) -> Frequency {
+        loop {
+            if let Some(output) =
+                output_of(drive).filter(|output| *output > self.lowest.saturating_add(ABOVE))
+            {
+                return output;
+            }
+            sleep(LOOK).await;
+        }
+    }
+
+    fn is_not_it(&self, output: Frequency) -> Failure {
+        Failure::Drive(format!(
+            "the output is {output} at a setpoint of {}: the scale of the one or the other is not this drive's. The motor was stopped, the \
+             trial ends here, and nothing is signed. Mend the profile, and try it anew",
+            self.lowest
+        ))
     }
 
     fn drive(&self) -> Box<dyn Drive> {
@@ -234,6 +290,10 @@ impl Steps {
     fn failed(&self, error: &drive_core::Error) -> Failure {
         Failure::Drive(words(self.name, &self.config, error))
     }
+}
+
+fn output_of(drive: &DriveHandle) -> Option<Frequency> {
+    drive.snapshot().status.as_ref().and_then(|status| status.value.output_frequency)
 }
 
 fn not_right() -> Failure {

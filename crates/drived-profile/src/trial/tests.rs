@@ -131,6 +131,25 @@ async fn a_profile_whose_states_are_not_those_of_the_drive_goes_no_further_and_w
     assert!(machine.received().iter().all(|request| request.pdu.first() == Some(&3)), "nothing was written");
 }
 
+/// A setpoint that is counted ten times as large reads back as it was written: the motor alone tells, and is stopped before anybody has
+/// answered.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_does_not_turn_at_what_was_given_is_stopped_at_once_and_nothing_is_signed() {
+    let of_the_setpoint = |scale| format!("{scale}\nsigned = true\nsource = \"oi2012 wb\"\n\n[register.ZSW]");
+    for scale in ["scale = [10, 16384]", "scale = [150, 16384]"] {
+        let (right, wrong) = (of_the_setpoint("scale = [100, 16384]"), of_the_setpoint(scale));
+        let (steps, machine) = steps((&right, &wrong));
+        let (answers, asked) = duplex(4_096);
+        let person = tokio::spawn(person(answers, machine.clone(), "v20"));
+        let mut seen = Vec::new();
+        let answered = steps.climb(&mut Console::reading(BufReader::new(asked)), &mut seen).await;
+        drop(person.await);
+        let failure = answered.expect_err("it is not what was given").to_string();
+        assert!(failure.contains("at a setpoint of 5.00 Hz: the scale of the one or the other"), "{failure}");
+        assert!(!machine.observe().running && seen.len() == 3, "{seen:#?}");
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_person_who_does_not_agree_or_has_gone_ends_it() {
     for said in ["no\n", ""] {
