@@ -120,7 +120,8 @@ table! {
     /// A measured value is above its limit.
     LimitExceeded: "limit_exceeded", "above its limit", Warning, false,
         "look at load, fan and filters, or at who gives a frequency above its limit";
-    /// Its output is not at its setpoint, and comes no nearer: for 2 s while it says that it is at its reference, for 20 s else.
+    /// Its output is not at its setpoint, and comes no nearer: for 2 s while it says that it is at its reference or the output goes on above it,
+    /// for 20 s else.
     OffSetpoint: "off_setpoint", "the output is not at its setpoint, and comes no nearer", Warning, false,
         "see what 100 % is at the drive (its reference frequency), its lowest and highest speed, and who else gives it a setpoint";
     /// It shows an alarm that does not trip.

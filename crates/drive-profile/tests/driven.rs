@@ -220,16 +220,17 @@ async fn a_drive_of_split_registers_is_turned_round_and_its_run_command_is_in_fo
 
 /// What was given and what the drive shows are two things: an input, a preset or another master may stand between them.
 #[tokio::test(start_paused = true)]
-async fn a_start_at_another_setpoint_than_was_given_is_not_confirmed() {
+async fn a_start_at_another_setpoint_than_was_given_is_none() {
     let mut rig = rig("goodrive");
     rig.drive.status().await.expect("it answers");
     give(&mut rig, 20).await;
     rig.machine.written_by_another(0x2001, 3_000).expect("it takes it");
-    let error = rig.drive.start(Direction::Forward).await.expect_err("it runs at 30 Hz");
+    let error = rig.drive.start(Direction::Forward).await.expect_err("it would run at 30 Hz");
     assert!(
-        matches!(error, Error::NotConfirmed { .. }) && error.to_string().contains("another setpoint"),
+        matches!(error, Error::Refused { .. }) && error.to_string().contains("is not the one that was given"),
         "{error}"
     );
+    assert!(!rig.machine.observe().running);
     give(&mut rig, 25).await;
     rig.drive.stop(StopMode::Ramp).await.expect("it stops");
     rig.until_machine("it stands", |machine| machine.shaft_frequency == 0).await;
@@ -591,6 +592,33 @@ async fn a_motor_whose_setpoint_nobody_could_have_given_is_not_started_until_one
     give(&mut rig, 30).await;
     rig.drive.start(Direction::Forward).await.expect("it is started");
     rig.until_machine("it turns forward", |machine| machine.output_frequency == 3_000).await;
+}
+
+/// 3333h in HSW is 40 Hz of 50 (16384 is 100 %): another master writes it, while the motor stands.
+#[tokio::test(start_paused = true)]
+async fn a_start_behind_a_stop_is_one_at_what_stands_and_behind_a_setpoint_one_at_that_or_none() {
+    let mut rig = running("v20").await;
+    rig.drive.stop(StopMode::Ramp).await.expect("it stops");
+    rig.until_machine("it stands", |machine| machine.output_frequency == 0).await;
+    rig.machine.poke(100, 0x3333);
+    rig.drive.status().await.expect("it answers");
+    let started = rig.drive.start(Direction::Forward).await.expect("it is started at what it holds");
+    assert_eq!(started.reference, Some(Frequency::from_hertz(40)));
+    rig.until_machine("it turns at that", |machine| machine.output_frequency == 4_000).await;
+
+    rig.drive.stop(StopMode::Ramp).await.expect("it stops");
+    rig.until_machine("it stands", |machine| machine.output_frequency == 0).await;
+    give(&mut rig, 30).await;
+    // Another master, and a power cut.
+    for lost in [0x3333, 0] {
+        rig.machine.poke(100, lost);
+        rig.drive.status().await.expect("it answers");
+        let error = rig.drive.start(Direction::Forward).await.expect_err("it is not what was given");
+        assert!(error.to_string().contains("is not the one that was given to it"), "{error}");
+        assert!(!rig.machine.observe().running, "nothing has moved");
+    }
+    give(&mut rig, 20).await;
+    rig.drive.start(Direction::Forward).await.expect("it is started");
 }
 
 /// Another master writes D99Ah into HSW, -30 Hz, while the motor runs forward at 30 Hz.

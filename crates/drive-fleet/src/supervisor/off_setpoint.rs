@@ -12,6 +12,9 @@ use crate::snapshot::OffSetpoint;
 const STAYS_FOR: Duration = Duration::from_secs(20);
 const STEADY: Frequency = Frequency::from_centihertz(25);
 
+/// By how much an output that is above its setpoint has to rise, to be one that goes away from it.
+const RISES: Frequency = Frequency::from_centihertz(50);
+
 /// What is seen of an output that is not at its setpoint.
 #[derive(Debug, Default)]
 pub(super) struct Watch {
@@ -19,6 +22,8 @@ pub(super) struct Watch {
     said_since: Option<Instant>,
     /// The lowest and the highest output since it stays where it is, and since when.
     stays: Option<(Frequency, Frequency, Instant)>,
+    /// The lowest and the highest output since it is above its setpoint and does not come down, and since when it rises.
+    above: Option<(Frequency, Frequency, Option<Instant>)>,
     off: Option<OffSetpoint>,
 }
 
@@ -34,9 +39,22 @@ impl Watch {
         let is_steady = high.centihertz().abs_diff(low.centihertz()) <= STEADY.centihertz();
         let stays = if is_steady { (low, high, since) } else { (off.output, off.output, now) };
         self.stays = Some(stays);
-        let lasts = |since: Instant, time| now.saturating_duration_since(since) >= time;
-        let is_off =
-            self.said_since.is_some_and(|since| lasts(since, CONFIRMED_WITHIN)) || lasts(stays.2, STAYS_FOR);
+        self.above = (off.output > off.setpoint).then(|| {
+            let (low, high, since) = self.above.unwrap_or((off.output, off.output, None));
+            let (low, high) = (low.min(off.output), high.max(off.output));
+            let rises = off.output.saturating_sub(low) > RISES;
+            match high.saturating_sub(off.output) > RISES {
+                true => (off.output, off.output, None),
+                false => (low, high, rises.then(|| since.unwrap_or(now))),
+            }
+        });
+        let lasts = |since: Option<Instant>, time| {
+            since.is_some_and(|since| now.saturating_duration_since(since) >= time)
+        };
+        let rises_since = self.above.and_then(|(.., since)| since);
+        let is_off = lasts(self.said_since, CONFIRMED_WITHIN)
+            || lasts(rises_since, CONFIRMED_WITHIN)
+            || lasts(Some(stays.2), STAYS_FOR);
         self.off = is_off.then_some(off);
     }
 

@@ -9,7 +9,7 @@ use drive_core::{
 use tokio::time::{Duration, Instant, sleep};
 
 use super::{
-    ProfileDrive,
+    ProfileDrive, Words,
     reading::{OTHERS, lacks},
     tables::{mode_name, stop_mode},
 };
@@ -48,8 +48,8 @@ const HELD_FOR: Duration = Duration::from_secs(1);
 const RUNGS: usize = 8;
 
 impl<P: Port> ProfileDrive<P> {
-    /// Whether nothing speaks against a start, by what is read now; whether the motor was fed.
-    pub(super) async fn start_is_allowed(&mut self, direction: Direction) -> Result<bool> {
+    /// Whether nothing speaks against a start, by what is read now; whether the motor was fed, and what was read.
+    pub(super) async fn start_is_allowed(&mut self, direction: Direction) -> Result<(bool, Words)> {
         let order = Order::Start(direction);
         self.allow(Level::Motion, "a start")?;
         if self.profile.start(direction).is_none() {
@@ -66,22 +66,22 @@ impl<P: Port> ProfileDrive<P> {
         let others = (runs && self.watch.run.lease().is_none()).then_some(NOT_OURS);
         match status.bars_motion().or(local).or(others) {
             Some(reason) => Err(self.refused(order, reason)),
-            None => Ok(was_fed),
+            None => Ok((was_fed, words)),
         }
     }
 
     /// Whether the setpoint that stands is one to start by, where none is given with the start.
-    pub(super) async fn check_standing(&mut self, direction: Direction) -> Result<()> {
+    pub(super) async fn check_standing(&mut self, direction: Direction, words: &Words) -> Result<()> {
         let is_the_start = self.profile.start(direction).is_some_and(Action::starts_by_setpoint);
         let lacks = (is_the_start && self.kept.is_none()).then_some(NO_SETPOINT);
-        let reason = if lacks.is_some() { lacks } else { self.refuses_standing().await? };
+        let reason = if lacks.is_some() { lacks } else { self.refuses_standing(words).await? };
         reason.map_or(Ok(()), |reason| Err(self.refused(Order::Start(direction), reason)))
     }
 
     pub(super) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
         let order = Order::Start(direction);
-        let was_fed = self.start_is_allowed(direction).await?;
-        self.check_standing(direction).await?;
+        let (was_fed, words) = self.start_is_allowed(direction).await?;
+        self.check_standing(direction, &words).await?;
         let profile = self.profile.clone();
         let Some(action) = profile.start(direction) else { return Err(NO_SUCH_START) };
         // At another one than was given nothing starts.
@@ -206,6 +206,8 @@ impl<P: Port> ProfileDrive<P> {
         // What the drive shows is no proof of a stop that it has refused or never got: behind a trip, or a state in which no motor turns,
         // the run command may stand and act when that goes away.
         let mut written = self.write_stop(action, order).await?;
+        // What is started behind it is started at what stands then, whoever has given that.
+        (self.agreed, self.agreed_before) = (None, None);
         self.withdrawn_at = None;
         // It has said of each write that nothing was done by it.
         let denied =

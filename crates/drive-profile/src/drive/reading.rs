@@ -11,7 +11,7 @@ use super::{
     cell::Cell,
     command::has_fallen,
     plan::Block,
-    sight::{FullScale, Test},
+    sight::{FullScale, Sight, Test},
 };
 use crate::{
     format::{Answer, Proves, UnitName},
@@ -106,7 +106,7 @@ impl<P: Port> ProfileDrive<P> {
         self.at_speed = fits(&sight.at_setpoint) == Some(true);
         let state = self.by_output(sight.state(words), output_frequency);
         let state = self.coming_down(state, output_frequency);
-        let control = match owned(words, sight.commanded_by.as_ref()) {
+        let control = match owned(&sight, words, sight.commanded_by.as_ref()) {
             Told::Yes => Some(Control::Bus),
             Told::No(_) => Some(Control::Local),
             Told::NotTold => None,
@@ -259,14 +259,14 @@ impl<P: Port> ProfileDrive<P> {
 
     /// Whether the drive tells that its reference is the bus's.
     pub(super) fn reference_is_ours(&self, words: &Words) -> bool {
-        owned(words, self.sight.reference_by.as_ref()) == Told::Yes
+        owned(&self.sight, words, self.sight.reference_by.as_ref()) == Told::Yes
     }
 
     pub(super) fn evidence(&self, status: &Status, words: &Words) -> Evidence {
-        let command = owned(words, self.sight.commanded_by.as_ref());
+        let command = owned(&self.sight, words, self.sight.commanded_by.as_ref());
         let seen = self.agreed.and_then(|_| self.setpoint_seen(words));
         let other = seen.is_some() && ![self.agreed, self.agreed_before].contains(&seen);
-        let reference = match owned(words, self.sight.reference_by.as_ref()) {
+        let reference = match owned(&self.sight, words, self.sight.reference_by.as_ref()) {
             _ if other => Told::No(OTHER_REFERENCE),
             Told::Yes if self.agreed.is_none() || !self.turns_as_commanded(status) => Told::NotTold,
             told => told,
@@ -285,7 +285,8 @@ impl<P: Port> ProfileDrive<P> {
 
     /// Who has command or reference instead of the bus, where the drive tells it.
     pub(super) fn commanded_by_other(&self, words: &Words) -> Option<Refusal> {
-        let told = [&self.sight.commanded_by, &self.sight.reference_by].map(|by| owned(words, by.as_ref()));
+        let told = [&self.sight.commanded_by, &self.sight.reference_by]
+            .map(|by| owned(&self.sight, words, by.as_ref()));
         told.into_iter().find_map(|told| if let Told::No(because) = told { Some(because) } else { None })
     }
 
@@ -335,8 +336,12 @@ impl<P: Port> ProfileDrive<P> {
 }
 
 /// Whether it is the bus, by the bits that tell it.
-fn owned(words: &Words, by: Option<&(Test, Proves)>) -> Told {
+fn owned(sight: &Sight, words: &Words, by: Option<&(Test, Proves)>) -> Told {
     let Some((test, proves)) = by else { return Told::NotTold };
+    // A word that no drive of the profile has when it is alive says nothing of it by its other bits either.
+    if sight.is_of_the_state(test) && sight.state(words) == State::Unknown {
+        return Told::NotTold;
+    }
     match (test.fits(words), proves) {
         (Some(true), Proves::Bus) => Told::Yes,
         (Some(false), _) => Told::No(OTHERS),

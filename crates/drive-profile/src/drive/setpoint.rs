@@ -34,6 +34,14 @@ const TOO_HIGH: Refusal = Refusal::Settings(
     "the setpoint that stands in it is above what may be given to it: give one before the start",
 );
 
+const ANOTHER: Refusal = Refusal::Settings(
+    "the setpoint that stands in it is not the one that was given to it: another master has written it, or a power cut has taken it: give \
+     one before the start",
+);
+
+/// What a setpoint may differ by in the register that takes it and in the one that shows it, in hundredths of a hertz.
+const STEP: u64 = 10;
+
 const NO_FULL_SCALE: Refusal = Refusal::Settings(
     "the drive counts in percent of a frequency that it does not tell: say it by full-scale, or give a setpoint in percent",
 );
@@ -148,7 +156,7 @@ impl<P: Port> ProfileDrive<P> {
 
     /// Why the setpoint that stands in the drive, by whomever it was given, is none to start by: a sign would turn the motor the other
     /// way, whichever is commanded, and what is beyond the limits would be refused to whoever gave it.
-    pub(super) async fn refuses_standing(&mut self) -> Result<Option<Refusal>> {
+    pub(super) async fn refuses_standing(&mut self, seen: &Words) -> Result<Option<Refusal>> {
         let profile = self.profile.clone();
         let file = profile.file();
         let Some(fact) = file.setpoint.given().map(crate::format::Spanned::get_ref) else { return Ok(None) };
@@ -168,10 +176,19 @@ impl<P: Port> ProfileDrive<P> {
         let hertz = self.hertz_of(&words, cell);
         // A highest that its owner has not said bounds only what is given.
         let highest = self.highest(fact, register, hertz, &words).map_or(i64::MAX, |(highest, _)| highest);
+        let stands = self.frequency(&words, cell).map(|frequency| i64::from(frequency.centihertz()));
         Ok(cell.counts(&words).and_then(|counts| match counts {
             ..0 => Some(NEGATIVE),
-            counts => (counts > highest).then_some(TOO_HIGH),
+            counts if counts > highest => Some(TOO_HIGH),
+            _ => stands.filter(|stands| self.was_given_otherwise(seen, *stands)).map(|_| ANOTHER),
         }))
+    }
+
+    /// Whether a setpoint that was given since the last stop is not the one that stands: its register, and the one by which it was seen,
+    /// may count in steps of their own.
+    fn was_given_otherwise(&self, seen: &Words, stands: i64) -> bool {
+        let is_a_frequency = self.sight.setpoint.is_some_and(|cell| self.frequency(seen, cell).is_some());
+        self.agreed.is_some_and(|agreed| is_a_frequency && agreed.abs_diff(stands) > STEP)
     }
 
     fn takes(&self, register: &Register, setpoint: Setpoint) -> Result<()> {

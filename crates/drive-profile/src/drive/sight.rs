@@ -123,6 +123,11 @@ impl Sight {
         }
     }
 
+    /// Whether these bits stand in a word by which the state is told.
+    pub(super) fn is_of_the_state(&self, test: &Test) -> bool {
+        self.states.iter().any(|(_, state)| state.bits.register.get_ref() == test.bits.register.get_ref())
+    }
+
     /// Which way it turns.
     pub(super) fn direction(&self, words: &Words) -> Option<Direction> {
         let (cell, turns) = self.direction.as_ref()?;

@@ -515,6 +515,30 @@ fn a_motor_that_is_driven_and_comes_no_nearer_to_its_setpoint_is_told_once_that_
     assert_eq!(off(&rig), None, "slip");
 }
 
+/// A scale that is wrong by ten, as of a drive by a file: nobody waits until it says that it is at its reference.
+#[test]
+fn a_motor_that_goes_on_above_its_setpoint_is_told_on_its_way() {
+    let mut rig = Rig::ready();
+    let id = rig.order(run_at(20));
+    rig.pass(500 * MS);
+    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
+    rig.drive.status.at_reference = Some(false);
+    let mut told = Vec::new();
+    // Up to the setpoint and an overshoot of a moment, back, and then on.
+    for hertz in [10, 20, 24, 25, 24, 20, 24, 28, 32, 36, 40, 44] {
+        rig.drive.status.output_frequency = Some(Frequency::from_hertz(hertz));
+        rig.pass(1_000 * MS);
+        told.extend(off(&rig).map(|_| hertz));
+    }
+    assert_eq!(told, [36, 40, 44]);
+    // It is given a lower setpoint, and comes down.
+    for hertz in (24..44).rev().step_by(2) {
+        rig.drive.status.output_frequency = Some(Frequency::from_hertz(hertz));
+        rig.pass(1_000 * MS);
+        assert_eq!(off(&rig), None, "{hertz}");
+    }
+}
+
 /// 100 % of a G120's setpoint is its p2000 (G120X p. 250), which nobody reads in hertz: at a p2000 of 60 Hz and a full scale of 50 Hz what is
 /// asked as 25 Hz is 30 Hz, and the drive says that it is there.
 #[test]
