@@ -198,8 +198,7 @@ impl<P: Port> Drive3g3ev<P> {
         let held = Command::from_bits_retain(self.read_command(Class::Command).await?.value);
         let lease = self.watch.run.lease();
         let stands = held.contains(Command::RUN);
-        let ours = lease.is_some_and(|lease| lease.word == held.bits())
-            || commanded_by_other(&status) == Some(OTHER_COMMAND);
+        let ours = self.watch.run.is_own(held.bits()) || commanded_by_other(&status) == Some(OTHER_COMMAND);
         // One that was not seen to arrive may come late: what stands is written again, and read after it.
         let may_come = !stands && lease.is_some();
         if !(may_come || stands && ours) {

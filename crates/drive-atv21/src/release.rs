@@ -53,8 +53,7 @@ impl<P: Port> Atv21<P> {
         let held = self.command_word(Class::Command).await?;
         let lease = self.watch.run.lease();
         let stands = held.contains(CommandWord::RUN);
-        let ours =
-            lease.is_some_and(|lease| lease.word == held.bits()) || commanded_by_other(&status).is_some();
+        let ours = self.watch.run.is_own(held.bits()) || commanded_by_other(&status).is_some();
         // One that was not seen to arrive may come late: what stands is written again, and read after it.
         let may_come = !stands && lease.is_some();
         if !(may_come || stands && ours) {

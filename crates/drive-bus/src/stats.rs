@@ -168,6 +168,12 @@ impl Stats {
         (self.opened <= self.lost && !why.starts_with(NOTHING_HEARD)).then_some(why)
     }
 
+    /// The same, where that is known: a port that is opened for the first time is not away yet.
+    #[must_use]
+    pub fn port_known_away(&self) -> Option<&str> {
+        self.port_away().filter(|_| self.away.is_some())
+    }
+
     /// Whether everything that came as an answer came sooner than the configured speed can carry it, so that nothing was taken
     /// for one: three times at least, and nothing else. The far end is faster then than it is said to be, an adapter without a
     /// UART or a program, and [`far_end_paces`](crate::LineConfig::far_end_paces) is to be `Some(false)`; or the speed is set

@@ -142,6 +142,13 @@ impl OwnRun {
         }
     }
 
+    /// Whether this run command is one of this side: the one that was given last, or the one before it while that was not seen to arrive.
+    #[must_use]
+    pub fn is_own(&self, word: u16) -> bool {
+        let before = self.before.map(|(before, _)| before);
+        self.lease.into_iter().chain(before).any(|lease| lease.word == word)
+    }
+
     /// A run command is about to be written.
     pub const fn give(&mut self, lease: Lease) {
         // One of which nobody knows whether it arrived may stand as well: its answer was lost.
@@ -211,7 +218,9 @@ impl OwnRun {
             return None;
         }
         // A lost answer leaves open whether the word arrived; that it stands settles it.
-        self.arrived |= evidence.word == RunWord::Stands;
+        if evidence.word == RunWord::Stands {
+            (self.arrived, self.before) = (true, None);
+        }
         let gone = match evidence.word {
             RunWord::Stands | RunWord::NotTold => None,
             _ if !self.arrived => Some(UNSEEN),
@@ -301,6 +310,25 @@ mod tests {
             lost.judge(&evidence);
             assert_eq!(lost.lease(), None);
         }
+    }
+
+    /// A start the other way that the drive could not complete: what it runs by is still of this side, and is to be withdrawn.
+    #[test]
+    fn the_run_command_before_one_that_was_not_seen_to_arrive_is_still_this_sides() {
+        let reverse = Lease::new(Direction::Reverse, 0x080F);
+        let mut own = given();
+        own.give(reverse);
+        assert_eq!([RUN.word, reverse.word, 0x0006].map(|word| own.is_own(word)), [true, true, false]);
+        own.judge(&Evidence { word: RunWord::Another, ..IN_FORCE });
+        assert!(own.is_own(RUN.word), "it stands");
+        own.judge(&IN_FORCE);
+        assert_eq!(
+            [RUN.word, reverse.word].map(|word| own.is_own(word)),
+            [false, true],
+            "its successor stands"
+        );
+        own.end();
+        assert!(!own.is_own(reverse.word));
     }
 
     #[test]

@@ -106,6 +106,10 @@ fn no_story_that_was_a_find_is_one_again() {
             "4.4.0.e11.o12.e7",
             "a 3G3EV run by its panel behind a reset, of which its twin heard nothing: the stories were wrong",
         ),
+        (
+            "4.4.0.o5.f51x4.o6.o14",
+            "a 3G3EV that could not complete a start the other way: what it ran by was not withdrawn",
+        ),
         ("5.4.0.o5.l3.o8.o10", "freewheel behind a ramp: told at rest at 5 Hz, as if the ramp had ended"),
         ("3.4.0.o13.e14.e12", "released to the terminals, which start it: the stories were wrong"),
         (

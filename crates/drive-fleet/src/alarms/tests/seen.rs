@@ -195,12 +195,14 @@ fn a_drive_that_answers_by_exceptions_does_not_count_as_silent() {
 #[test]
 fn a_port_that_is_opened_anew_because_nobody_answers_is_not_away() {
     let mut stats = drive_bus::stats::Stats::default();
+    assert_eq!(stats.port_known_away(), None, "it is opened for the first time");
     (stats.opened, stats.lost) = (3, 3);
     // As in the night whose line was cut: the adapter was there all the time.
     stats.away = Some("nothing was heard for 8.0 s, whoever was asked".to_owned());
     assert_eq!(stats.port_away(), None);
     stats.away = Some("there is no serial port /dev/ttyUSB0".to_owned());
     assert_eq!(stats.port_away(), Some("there is no serial port /dev/ttyUSB0"));
+    assert_eq!(stats.port_known_away(), stats.port_away());
     stats.opened = 4;
     assert_eq!(stats.port_away(), None, "it is open");
 }

@@ -64,7 +64,7 @@ impl Inner {
         let findings = line.findings();
         let is_heard = now.at.saturating_duration_since(self.alarms.began) >= HEARD_FOR;
         let seen = LineSeen {
-            away: stats.port_away().map(str::to_owned),
+            away: stats.port_known_away().map(str::to_owned),
             findings: (is_heard || !findings.is_empty()).then_some(&*findings),
         };
         let drives: Vec<&Snapshot> = drives.iter().map(|drive| &**drive).collect();
