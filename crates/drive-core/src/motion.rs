@@ -394,7 +394,12 @@ impl Shaft {
     fn brake(&mut self, at: Instant, output: Frequency, before: Descent) {
         self.descent = if self.was_braked() { before } else { Descent::default() };
         self.descent.see(at, output.centihertz());
-        self.past = Past::Braked { still: output == Frequency::ZERO };
+        let still = output == Frequency::ZERO;
+        // One whose output was cut is not brought down by what its words still say of a ramp.
+        let coasts = matches!(self.past, Past::Coasts(since) if still && !self.has_coasted(at, since));
+        if !coasts {
+            self.past = Past::Braked { still };
+        }
     }
 
     /// A run command acts, at no output. It stands where it stood, or was seen to come down so far; else it may coast below a run
@@ -526,6 +531,15 @@ mod tests {
             assert!(!shaft.was_braked());
             assert_eq!(shaft.see(now, gone, Some(Frequency::ZERO)), Motion::Coasting);
         }
+        // Its output was gone at 26 Hz while a run command acted, and the words of a ramp come behind.
+        let mut shaft = Shaft::new();
+        let seen =
+            [(0, Output::Driven, 26), (40, Output::Driven, 0), (60, Output::Braking(Frequency::ZERO), 0)];
+        for (at, shown, hertz) in seen {
+            shaft.see(now + Duration::from_millis(at), shown, Some(Frequency::from_hertz(hertz)));
+        }
+        let cut = now + Duration::from_millis(80);
+        assert_eq!(shaft.see(cut, Output::Cut, Some(Frequency::ZERO)), Motion::Coasting);
         // The last moment of a ramp.
         let (mut shaft, after) = (Shaft::new(), |tenths: u64| now + Duration::from_millis(100 * tenths));
         for (at, hertz) in [(0, 3), (1, 2)] {

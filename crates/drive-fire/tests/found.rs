@@ -51,6 +51,10 @@ fn no_cell_that_was_a_find_is_one_again() {
     for (name, what) in [
         ("W:493662", "the silence of ASCII behind an echo: asked again into the answer"),
         ("W:364162", "the same"),
+        (
+            "A:147610559",
+            "a G120 whose output is cut in a stop: told at rest at 26 Hz by the words of a ramp behind it",
+        ),
         ("W:201462", "the same behind a damaged echo"),
         ("W:346590", "a 21 whose status word was refused: told that it may coast while it injects"),
         // Explained: between two looks half a second apart a supply went and came back. The words are those of a ramp that has ended.
