@@ -105,28 +105,22 @@ fn status(family: Family) -> StatusWord {
     }
 }
 
+/// As the Modbus specification has them, of which their manuals list 1 to 4; and last UNI-TE's negative reply (Altivar 58, p. 13/37).
+static SPECIFIED: [(u8, ExceptionMeaning); 7] = [
+    (1, NoSuchFunction),
+    (2, NoSuchRegister),
+    (3, ValueRefused),
+    (4, Failed),
+    (5, Accepted),
+    (6, Busy),
+    (0xFD, Refused),
+];
+
 fn exceptions(family: Family) -> &'static [(u8, ExceptionMeaning)] {
     match five(family) {
         Five::Atv21 => &[(1, NoSuchFunction), (2, NoSuchRegister), (3, ValueRefused), (4, NotNow)],
-        // Their manuals list 1 to 4 as the Modbus specification has them; 5 and 6 are the specification's.
-        Five::Atv28 | Five::Atv312 => &[
-            (1, NoSuchFunction),
-            (2, NoSuchRegister),
-            (3, ValueRefused),
-            (4, Failed),
-            (5, Accepted),
-            (6, Busy),
-        ],
-        // And UNI-TE's negative reply, p. 13/37.
-        Five::Atv58 => &[
-            (1, NoSuchFunction),
-            (2, NoSuchRegister),
-            (3, ValueRefused),
-            (4, Failed),
-            (5, Accepted),
-            (6, Busy),
-            (0xFD, Refused),
-        ],
+        Five::Atv28 | Five::Atv312 => &SPECIFIED[..6],
+        Five::Atv58 => &SPECIFIED,
         Five::Omron3g3ev => &[
             (1, NoSuchFunction),
             (2, NoSuchRegister),

@@ -104,8 +104,8 @@ impl ExceptionMeaning {
     }
 
     /// Whether it says of a write that nothing was done by it. "Began and could not complete" (04h), "takes long" (05h), a
-    /// gateway's or network's "no way to it" (0Ah) and "heard no answer" (0Bh) and a code of which the manual says nothing leave that open: the write may have been
-    /// carried out, and a run word may turn the motor.
+    /// gateway's or network's "no way to it" (0Ah) and "heard no answer" (0Bh), and a code of which the manual says nothing leave
+    /// that open: the write may have been carried out, and a run word may turn the motor.
     #[must_use]
     pub const fn denies(self) -> bool {
         matches!(

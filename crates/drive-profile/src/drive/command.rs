@@ -70,25 +70,30 @@ impl<P: Port> ProfileDrive<P> {
         }
     }
 
-    /// Whether the setpoint that stands is one to start by, where none is given with the start.
-    pub(super) async fn check_standing(&mut self, direction: Direction, words: &Words) -> Result<()> {
+    /// Whether the setpoint that stands is one to start by, where none is given with the start; and what it is, where another register
+    /// shows the one in force.
+    pub(super) async fn check_standing(
+        &mut self,
+        direction: Direction,
+        words: &Words,
+    ) -> Result<Option<i64>> {
         let is_the_start = self.profile.start(direction).is_some_and(Action::starts_by_setpoint);
-        let lacks = (is_the_start && self.kept.is_none()).then_some(NO_SETPOINT);
-        let reason = if lacks.is_some() { lacks } else { self.refuses_standing(words).await? };
-        reason.map_or(Ok(()), |reason| Err(self.refused(Order::Start(direction), reason)))
+        let (reason, stands) = match is_the_start && self.kept.is_none() {
+            true => (Some(NO_SETPOINT), None),
+            false => self.standing(words).await?,
+        };
+        reason.map_or(Ok(stands), |reason| Err(self.refused(Order::Start(direction), reason)))
     }
 
     pub(super) async fn start_motor(&mut self, direction: Direction) -> Result<Status> {
         let order = Order::Start(direction);
         let (was_fed, words) = self.start_is_allowed(direction).await?;
-        self.check_standing(direction, &words).await?;
+        let stands = self.check_standing(direction, &words).await?;
         let profile = self.profile.clone();
         let Some(action) = profile.start(direction) else { return Err(NO_SUCH_START) };
         // At another one than was given nothing starts.
         self.agreed_before = None;
-        if self.agreed.is_none() {
-            self.agreed = self.setpoint_held().await;
-        }
+        self.agreed = self.agreed.or(stands);
         self.climb(order).await?;
         let Some((last, before)) = action.steps.split_last() else { return Err(self.refused(order, OTHERS)) };
         let mut is_begun = false;
@@ -206,8 +211,11 @@ impl<P: Port> ProfileDrive<P> {
         // What the drive shows is no proof of a stop that it has refused or never got: behind a trip, or a state in which no motor turns,
         // the run command may stand and act when that goes away.
         let mut written = self.write_stop(action, order).await?;
-        // What is started behind it is started at what stands then, whoever has given that.
-        (self.agreed, self.agreed_before) = (None, None);
+        // What is started behind it is started at what stands then, whoever has given that; where the setpoint is the run command, at
+        // the one that is kept.
+        if !profile.file().starts_by_setpoint() {
+            (self.agreed, self.agreed_before) = (None, None);
+        }
         self.withdrawn_at = None;
         // It has said of each write that nothing was done by it.
         let denied =

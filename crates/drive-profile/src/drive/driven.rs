@@ -104,7 +104,7 @@ impl<P: Port> Drive for ProfileDrive<P> {
     async fn may_start(&mut self, direction: Direction, setpoint: Option<Setpoint>) -> Result<()> {
         self.registers.begin_order();
         let (_, words) = self.start_is_allowed(direction).await?;
-        if setpoint.is_some() { Ok(()) } else { self.check_standing(direction, &words).await }
+        if setpoint.is_some() { Ok(()) } else { self.check_standing(direction, &words).await.map(drop) }
     }
 
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped> {

@@ -136,52 +136,39 @@ impl<P: Port> ProfileDrive<P> {
         self.see_setpoint(setpoint, word).await.map_err(Error::after_write)
     }
 
-    /// The setpoint that the bus has given, by whomever, where its register can be read and another shows the one in force.
-    pub(super) async fn setpoint_held(&mut self) -> Option<i64> {
-        let profile = self.profile.clone();
-        let file = profile.file();
-        let fact = file.setpoint.given()?.get_ref();
-        let (name, seen) = (fact.register.get_ref(), file.see.setpoint.given()?.get_ref());
-        let can = |name: &str| file.named(name).is_some_and(|register| register.access != Access::Write);
-        if name == seen || !can(name) || file.starts_by_setpoint() {
-            return None;
-        }
-        let mut words = self.limits(fact).await.ok()?;
-        for block in profile.blocks(&[name.as_str()].into()) {
-            let read = self.read_block(Class::Command, block).await.ok()?;
-            words.keep(block, read);
-        }
-        self.frequency(&words, profile.cell(name)?).map(|frequency| frequency.centihertz().into())
-    }
-
     /// Why the setpoint that stands in the drive, by whomever it was given, is none to start by: a sign would turn the motor the other
-    /// way, whichever is commanded, and what is beyond the limits would be refused to whoever gave it.
-    pub(super) async fn refuses_standing(&mut self, seen: &Words) -> Result<Option<Refusal>> {
+    /// way, whichever is commanded, and what is beyond the limits would be refused to whoever gave it. And what it is, where another
+    /// register shows the one in force.
+    pub(super) async fn standing(&mut self, seen: &Words) -> Result<(Option<Refusal>, Option<i64>)> {
         let profile = self.profile.clone();
         let file = profile.file();
-        let Some(fact) = file.setpoint.given().map(crate::format::Spanned::get_ref) else { return Ok(None) };
+        let Some(fact) = file.setpoint.given().map(crate::format::Spanned::get_ref) else {
+            return Ok((None, None));
+        };
         let name = fact.register.get_ref();
         let Some(register) = file.named(name).filter(|register| register.access != Access::Write) else {
-            return Ok(None);
+            return Ok((None, None));
         };
         if file.starts_by_setpoint() {
-            return Ok(None);
+            return Ok((None, None));
         }
         let mut words = self.limits(fact).await?;
         for block in profile.blocks(&[name.as_str()].into()) {
             let read = self.read_block(Class::Command, block).await?;
             words.keep(block, read);
         }
-        let Some(cell) = profile.cell(name) else { return Ok(None) };
+        let Some(cell) = profile.cell(name) else { return Ok((None, None)) };
         let hertz = self.hertz_of(&words, cell);
         // A highest that its owner has not said bounds only what is given.
         let highest = self.highest(fact, register, hertz, &words).map_or(i64::MAX, |(highest, _)| highest);
         let stands = self.frequency(&words, cell).map(|frequency| i64::from(frequency.centihertz()));
-        Ok(cell.counts(&words).and_then(|counts| match counts {
+        let refusal = cell.counts(&words).and_then(|counts| match counts {
             ..0 => Some(NEGATIVE),
             counts if counts > highest => Some(TOO_HIGH),
             _ => stands.filter(|stands| self.was_given_otherwise(seen, *stands)).map(|_| ANOTHER),
-        }))
+        });
+        let another_shows = file.see.setpoint.given().is_some_and(|seen| seen.get_ref() != name);
+        Ok((refusal, stands.filter(|_| another_shows)))
     }
 
     /// Whether a setpoint that was given since the last stop is not the one that stands: its register, and the one by which it was seen,

@@ -180,15 +180,12 @@ impl Steps {
             format!("Does the panel show {}, and does the motor turn that slowly, forward?", self.lowest);
         let looks = async {
             self.comes_to_it(&drive).await?;
-            tokio::select! {
-                biased;
-                output = self.runs_away(&drive) => Err(self.is_not_it(output)),
-                turns = console.agrees(&question) => turns,
-            }
+            console.agrees(&question).await
         };
         let turns = tokio::select! {
             biased;
             () = one.asked_to_end() => Err(asked_to_end()),
+            output = self.runs_away(&drive) => Err(self.is_not_it(output)),
             turns = looks => turns,
         };
         let Stop { status, .. } = one.stop(StopMode::Ramp).await?;
@@ -209,7 +206,7 @@ impl Steps {
     async fn comes_to_it(&self, drive: &DriveHandle) -> Result<(), Failure> {
         let (until, mut there_since) = (Instant::now() + AT_THE_PANEL, None);
         while let Some(output) = output_of(drive) {
-            if output > self.lowest.saturating_add(ABOVE) || Instant::now() >= until {
+            if Instant::now() >= until {
                 return Err(self.is_not_it(output));
             }
             let is_there = output >= self.lowest.saturating_sub(NEAR);

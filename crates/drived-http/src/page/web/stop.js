@@ -151,7 +151,8 @@
     if (command.action === 'stop') later.withdraw?.(command);
     // Above a motor that turns again nobody reads that all have stopped.
     const isOver = account.phase === 'taken' && !account.open && !left().length;
-    if (command.action === 'start' && command.outcome === 'confirmed' && isOver) end();
+    const isLater = command.time_unix_ms > account.answer?.time_unix_ms;
+    if (command.action === 'start' && command.outcome === 'confirmed' && isOver && isLater) end();
   }
 
   function take(answer) {

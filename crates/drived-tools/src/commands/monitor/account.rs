@@ -31,8 +31,8 @@ pub(super) struct Account {
 pub(super) enum Sent {
     /// It has been given to so many drives as were known, and nobody has answered yet; so often in vain.
     Sending { drives: usize, failed: u32, why: String },
-    /// The daemon has it, and said last so.
-    Taken { count: Count, out_of_sight: Option<String> },
+    /// The daemon has it since then, by its own clock, and said last so.
+    Taken { count: Count, out_of_sight: Option<String>, arrived_unix_ms: u64 },
     /// It could not be given, or nobody knows what became of it.
     Failed(String),
 }
@@ -69,7 +69,8 @@ impl Account {
     pub(super) fn take(&mut self, progress: Progress, is_silent: bool) {
         match (progress, &mut self.state) {
             (Progress::Answer(answer), state) => {
-                *state = Sent::Taken { count: Count::of(&answer, is_silent), out_of_sight: None };
+                let (count, arrived_unix_ms) = (Count::of(&answer, is_silent), answer.time_unix_ms);
+                *state = Sent::Taken { count, out_of_sight: None, arrived_unix_ms };
             }
             (Progress::Again(text), Sent::Sending { failed, why, .. }) => {
                 *failed += 1;
@@ -101,13 +102,15 @@ impl Account {
     /// Whether a motor that has confirmed it was started since.
     pub(super) fn is_over_by(&self, command: &CommandView) -> bool {
         let starts = command.action == ActionWord::Start && command.outcome == OutcomeWord::Confirmed;
+        // One from before may be told behind it.
+        let is_later = matches!(&self.state, Sent::Taken { arrived_unix_ms, .. } if command.time_unix_ms > *arrived_unix_ms);
         let its = |name: &str| match &self.stop {
             Stop::All => true,
             Stop::One(own) => own == name,
         };
         let several = command.several.iter().flat_map(|several| &several.drives);
         let mut names = several.filter_map(|one| one.drive.as_deref()).chain(command.drive.as_deref());
-        starts && !self.is_open() && self.is_done() && names.any(its)
+        starts && is_later && self.is_done() && names.any(its)
     }
 
     /// What is told of it: first what was done, then how it stands.
@@ -124,7 +127,7 @@ impl Account {
             Sent::Sending { failed, why, .. } => {
                 format!("{what}: NOT SENT YET, tried {failed} times: {why}: use the emergency stop")
             }
-            Sent::Taken { count, out_of_sight } => {
+            Sent::Taken { count, out_of_sight, .. } => {
                 let sight = out_of_sight.as_ref().map(|why| format!("; out of sight: {why}"));
                 format!("{what}: {}{}", count.sentence(), sight.unwrap_or_default())
             }

@@ -69,12 +69,7 @@ pub struct Comparison {
 }
 
 pub(super) async fn run(args: Args) -> Result<(), Failure> {
-    // Exit code 1 says that they differ, and nothing else.
-    let compared = sides(&args).await.map_err(|failure| match failure {
-        Failure::Drive(why) => Failure::Input(why),
-        failure => failure,
-    });
-    let [left, right] = compared?;
+    let [left, right] = sides(&args).await.map_err(trouble)?;
     let (one, other) = (left.backup.head.family, right.backup.head.family);
     if one != other {
         return Err(Failure::Input(format!("the families {one} and {other} have no parameters in common")));
@@ -84,14 +79,19 @@ pub(super) async fn run(args: Args) -> Result<(), Failure> {
         true => output::say_as_it_is(comparison.json(&left.title, &right.title)),
         false => comparison.say(&left.title, &right.title),
     };
-    said.map_err(|failure| match failure {
-        Failure::Output(why) => Failure::Input(why),
-        failure => failure,
-    })?;
+    said.map_err(trouble)?;
     match comparison.differences.len() {
         0 => Ok(()),
         1 => Err(Failure::Drive("1 parameter differs".to_owned())),
         several => Err(Failure::Drive(format!("{several} parameters differ"))),
+    }
+}
+
+/// Exit code 1 says that they differ, and nothing else.
+fn trouble(failure: Failure) -> Failure {
+    match failure {
+        Failure::Drive(_) | Failure::Output(_) => Failure::Input(failure.to_string()),
+        failure => failure,
     }
 }
 

@@ -356,15 +356,17 @@ fn what_was_told_of_a_stop_goes_when_a_motor_that_confirmed_it_is_started() {
     let answer = json!({"id": "c-1", "outcome": "confirmed", "drives": drives,
                         "confirmed": 2, "pending": 0, "not_reachable": 0});
     monitor.model.take(News::Stop { number: 1, progress: Progress::Answer(command(answer)) }, monitor.now);
-    let start = |outcome: &str| {
-        let started = command(json!({"id": "c-2", "drive": "pump 2", "action": "start", "outcome": outcome}));
-        News::Heard(Heard::Command(Box::new(Arc::unwrap_or_clone(started))))
+    let stopped = 1_700_000_000_000_u64;
+    let start = |outcome: &str, at: u64| {
+        let told = json!({"id": "c-2", "drive": "pump 2", "action": "start", "outcome": outcome, "time_unix_ms": at});
+        News::Heard(Heard::Command(Box::new(Arc::unwrap_or_clone(command(told)))))
     };
-    for outcome in ["pending", "refused"] {
-        monitor.model.take(start(outcome), monitor.now);
+    // The last is from before the stop, and told behind it.
+    for (outcome, at) in [("pending", stopped + 5), ("refused", stopped + 5), ("confirmed", stopped - 5)] {
+        monitor.model.take(start(outcome, at), monitor.now);
         assert!(monitor.screen(80, 24).contains("2 confirmed"), "{outcome}: it stands still");
     }
-    monitor.model.take(start("confirmed"), monitor.now);
+    monitor.model.take(start("confirmed", stopped + 5), monitor.now);
     assert!(!monitor.screen(80, 24).contains("2 confirmed"), "{}", monitor.screen(80, 24));
 }
 
