@@ -60,6 +60,15 @@ impl DaemonArgs {
         if self.json { output::say_as_it_is(drived_words::json::line(body)) } else { text() }
     }
 
+    /// The same of what is done, whether or not anybody can read that.
+    pub fn say_done(
+        &self,
+        body: &impl serde::Serialize,
+        text: impl FnOnce() -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        output::done(self.say(body, text))
+    }
+
     pub const fn is_json(&self) -> bool {
         self.json
     }

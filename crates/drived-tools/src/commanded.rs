@@ -148,12 +148,12 @@ impl Commanded {
         })
     }
 
-    /// What is known of the drive now.
     /// The drive, for whoever looks at it while it is commanded.
     pub fn handle(&self) -> DriveHandle {
         self.handle.clone()
     }
 
+    /// What is known of the drive now.
     pub fn status(&self) -> Status {
         let snapshot = self.handle.snapshot();
         snapshot.status.as_ref().map(|status| Status::clone(&status.value)).unwrap_or_default()

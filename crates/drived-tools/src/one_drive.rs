@@ -134,9 +134,7 @@ impl OneDriveArgs {
         let name = one.name;
         let body =
             json!({ "drive": name.to_string(), "action": action, "outcome": "confirmed", "status": status });
-        let said =
-            self.daemon.say(&body, || output::say(format_args!("{name} {done}: the drive shows {status}")));
-        output::done(said)
+        self.daemon.say_done(&body, || output::say(format_args!("{name} {done}: the drive shows {status}")))
     }
 
     /// The same for a start, with the setpoint that it uses.
@@ -146,10 +144,8 @@ impl OneDriveArgs {
             "drive": name.to_string(), "action": "start", "outcome": "confirmed", "text": started.to_string(), "started": started,
             "status": status,
         });
-        let said = self
-            .daemon
-            .say(&body, || output::say(format_args!("{name} {started}: the drive shows {status}")));
-        output::done(said)
+        self.daemon
+            .say_done(&body, || output::say(format_args!("{name} {started}: the drive shows {status}")))
     }
 
     /// The same for a stop, with how it was asked for and how the drive has stopped.
@@ -174,9 +170,9 @@ impl OneDriveArgs {
             );
         }
         let stopped = values::stopped(Some(status));
-        output::done(self.daemon.say(&body, || {
+        self.daemon.say_done(&body, || {
             output::say(format_args!("{name} {stopped}{by}{behind}: the drive shows {status}"))
-        }))
+        })
     }
 
     /// [`command`](Self::command) for a stop, which is sent as soon as the port can be opened.

@@ -127,7 +127,7 @@ fn a_stop_by_a_daemon_that_is_read_by_nobody_is_the_drives_own_end() {
                 let (_, writer) = std::io::pipe().expect("there is one");
                 return writer.into();
             }
-            std::fs::OpenOptions::new().write(true).open("/dev/full").expect("it is there").into()
+            full_disk().into()
         };
         let mut stop = support::drived(&["stop", "pump 1", "--socket", daemon.socket()]);
         let ended = stop.stdout(unread()).output().expect("the program starts");
@@ -139,6 +139,30 @@ fn a_stop_by_a_daemon_that_is_read_by_nobody_is_the_drives_own_end() {
             "{said}"
         );
     }
+}
+
+/// What is only asked for is not known then to whoever asked; what is done is done.
+#[cfg(target_os = "linux")]
+#[test]
+fn what_the_daemon_has_done_is_no_failure_for_an_output_that_cannot_be_written() {
+    let daemon = Daemon::start("full-output", "");
+    for (asked, code) in [
+        (&["reload"][..], 0),
+        (&["reload", "--dry-run"], 1),
+        (&["alarms", "acknowledge", "--all"], 0),
+        (&["alarms", "list"], 1),
+    ] {
+        let asked = [asked, &["--socket", daemon.socket()]].concat();
+        let ended = support::drived(&asked).stdout(full_disk()).output().expect("the program starts");
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(code), "{asked:?}: {said}");
+        assert!(said.contains("the output cannot be written"), "{asked:?}: {said}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+fn full_disk() -> std::fs::File {
+    std::fs::OpenOptions::new().write(true).open("/dev/full").expect("it is there")
 }
 
 #[test]

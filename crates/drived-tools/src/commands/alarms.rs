@@ -96,7 +96,7 @@ pub async fn run(command: Command) -> Result<(), Failure> {
                 done.push(act(&mut connection, alarm.alarm.id, "acknowledge", &body).await?);
             }
             let done = AlarmsView { alarms: done, dropped: told.dropped };
-            daemon.say(&done, || match &*done.alarms {
+            daemon.say_done(&done, || match &*done.alarms {
                 [] => output::say("no alarm waits for anybody"),
                 some => some.iter().try_for_each(one),
             })
@@ -104,16 +104,16 @@ pub async fn run(command: Command) -> Result<(), Failure> {
         Command::Shelve { number, minutes, why, daemon } => {
             let body = json!({ "minutes": minutes, "why": why });
             let shelved = act(&mut daemon.connect().await?, number, "shelve", &body).await?;
-            daemon.say(&shelved, || one(&shelved))
+            daemon.say_done(&shelved, || one(&shelved))
         }
         Command::Done { number, note, daemon } => {
             let body = note.map_or(json!({}), |note| json!({ "note": note }));
             let done = act(&mut daemon.connect().await?, number, "done", &body).await?;
-            daemon.say(&done, || one(&done))
+            daemon.say_done(&done, || one(&done))
         }
         Command::Unshelve { number, daemon } => {
             let back = act(&mut daemon.connect().await?, number, "unshelve", &json!({})).await?;
-            daemon.say(&back, || one(&back))
+            daemon.say_done(&back, || one(&back))
         }
     }
 }

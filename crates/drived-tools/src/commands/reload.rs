@@ -20,8 +20,9 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let mut daemon = args.daemon.connect().await?;
     let path = if args.dry_run { "/api/v1/reload?dry_run=true" } else { "/api/v1/reload" };
     let done: Changes = daemon.post(path, &json!({})).await?.done()?;
-    args.daemon.say(&done, || match &*done.changes {
+    let text = || match &*done.changes {
         [] => output::say("nothing has changed"),
         changes => changes.iter().try_for_each(output::say),
-    })
+    };
+    if args.dry_run { args.daemon.say(&done, text) } else { args.daemon.say_done(&done, text) }
 }

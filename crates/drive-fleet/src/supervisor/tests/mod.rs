@@ -6,6 +6,7 @@ mod connection;
 mod control;
 mod eeprom;
 mod matrix;
+mod off_setpoint;
 mod orders;
 mod questions;
 mod shown;
@@ -417,6 +418,15 @@ impl Rig {
         rig.pass(1_500 * MS);
         rig.outputs.clear();
         rig.drive.log.clear();
+        rig
+    }
+
+    /// One that was started by an order, and has confirmed it.
+    fn running_at(hertz: u16) -> Self {
+        let mut rig = Self::ready();
+        let id = rig.order(run_at(hertz));
+        rig.pass(500 * MS);
+        assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
         rig
     }
 

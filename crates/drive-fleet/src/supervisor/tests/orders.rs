@@ -4,10 +4,7 @@ use super::*;
 
 #[test]
 fn a_start_gives_the_setpoint_first_and_is_confirmed_at_the_reference() {
-    let mut rig = Rig::ready();
-    let id = rig.order(run_at(40));
-    rig.pass(500 * MS);
-    assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
+    let rig = Rig::running_at(40);
     let setpoint = Frequency::from_hertz(40).into();
     assert_eq!(
         rig.drive.writes(),

@@ -89,12 +89,12 @@ pub(super) async fn set(
             }
             Err(failure) => {
                 // What was written is told though it is not saved.
-                output::done(args.daemon.say(&body, || text.iter().try_for_each(output::say)))?;
+                args.daemon.say_done(&body, || text.iter().try_for_each(output::say))?;
                 return Err(failure);
             }
         }
     }
-    output::done(args.daemon.say(&body, || text.iter().try_for_each(output::say)))?;
+    args.daemon.say_done(&body, || text.iter().try_for_each(output::say))?;
     one.close().await;
     Ok(())
 }
@@ -136,7 +136,7 @@ pub(super) async fn save_all(args: &OneDriveArgs, ledger: &LedgerArgs) -> Result
     let mut one = args.open_to_write(ledger).await?;
     let (saves, text) = persist(&mut one).await?;
     let body = json!({ "drive": name.to_string(), "action": "save", "outcome": "confirmed", "saves": saves });
-    output::done(args.daemon.say(&body, || output::say(text)))?;
+    args.daemon.say_done(&body, || output::say(text))?;
     one.close().await;
     Ok(())
 }

@@ -43,10 +43,10 @@ pub(super) async fn set(
     let written: WrittenView = written.done()?;
     let text = written.parameter.text.as_deref().unwrap_or_default();
     let running = running.filter(|_| written.changed);
-    output::done(one.daemon.say(&written, || {
+    one.daemon.say_done(&written, || {
         output::say(format_args!("{name} {text}"))?;
         running.map_or(Ok(()), |status| output::say(moved(status)))
-    }))
+    })
 }
 
 /// Saves the parameters of a drive to its EEPROM.
