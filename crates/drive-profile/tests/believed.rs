@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use drive_core::{Direction, Drive, Error, ErrorKind, Frequency, State, StopMode};
+use drive_core::{Direction, Drive, Error, ErrorKind, Frequency, State, StopMode, Verdict};
 use drive_families::{Family, Options, SetUp};
 use drive_profile::{definition, read, shipped};
 use drive_testing::{Contract, rig::Rig};
@@ -123,4 +123,41 @@ async fn a_drive_whose_status_word_is_zero_is_no_sinamics_and_its_stop_is_not_co
         let stopped = rig.drive.stop(StopMode::Ramp).await.expect_err("nobody has seen it stop");
         assert_eq!(stopped.kind(), ErrorKind::NotConfirmed, "{key}: {stopped}");
     }
+}
+
+/// 0003h of a WJ200 or MX2 is 0 in the initial state, and coil 0010h by the manual's count (0Fh on the wire) says whether the motor runs
+/// (WJ200 B7 p. 342): of both, the one that tells of a motor that runs is believed.
+#[tokio::test(start_paused = true)]
+async fn a_word_of_the_initial_state_stops_no_motor_whose_own_coil_says_that_it_runs() {
+    for (key, path) in [("wj200", "hitachi/wj200"), ("mx2", "omron/mx2")] {
+        let real = family(key);
+        let text = shipped::TEXTS.iter().find(|(name, _)| *name == path).expect(key).1;
+        let runs = r#"state = "running", bits = { register = "STATE", mask = 0xFFFF, value = 3"#;
+        assert!(text.contains(runs), "{key}");
+        // One that tells the initial state while it runs.
+        let freed = text.replace("mask = 0xFFFF, value = 0,", "mask = 0xFFFF, value = 10,");
+        let odd = read(&freed.replace(runs, &runs.replace("value = 3", "value = 0"))).expect(key);
+        let odd = Family::new(definition(&Arc::new(odd)));
+        let options = real.simulated_options();
+        let open = move |port, slave| real.open_with(port, slave, &options);
+        let machine = move || odd.machine(SetUp::ForTheBus).expect("it has a twin");
+        let mut rig = Contract::new(real.capabilities(), open, machine).rig();
+        start_at(&mut rig, 25).await;
+        let status = rig.until_machine("it turns", |seen| seen.output_frequency == 2_500).await;
+        assert_eq!(rig.machine.peek(2), Some(0), "0003h of {key}");
+        assert_eq!((status.state, status.verdict), (State::Running, Some(Verdict::NotKnown)), "{key}");
+    }
+}
+
+/// HSW stands as it was written, and is worth another frequency.
+#[tokio::test(start_paused = true)]
+async fn a_changed_p2000_is_told_beside_a_changed_setpoint_of_which_nobody_knows_which_it_was() {
+    let mut rig = rig_of("v20", Options::default());
+    start_at(&mut rig, 20).await;
+    rig.until_machine("it turns", |seen| seen.output_frequency.abs_diff(2_000) <= 1).await;
+    assert!(rig.machine.poke(P2000, 2_500), "at the drive");
+    let status =
+        rig.until("it is told", |status| matches!(status.verdict, Some(Verdict::NotInForce { .. }))).await;
+    let said = format!("{:?}", status.verdict);
+    assert!(said.contains("100 %"), "{said}");
 }

@@ -351,6 +351,20 @@ async fn a_start_that_would_be_refused_is_known_before_anything_is_written() {
     rig.drive.may_start(Direction::Forward, None).await.expect("nothing speaks against it");
 }
 
+/// A setpoint goes only to a motor that runs by this side's command where it is the run command: none is offered as the way out.
+#[tokio::test(start_paused = true)]
+async fn a_motor_of_another_whose_setpoint_is_its_run_command_is_refused_a_start_without_the_way_of_a_setpoint()
+ {
+    let mut rig = rig(profile(SIGNED));
+    rig.machine.written_by_another(SPEED, 2_000).expect("20 Hz by another master");
+    rig.until_machine("it runs", |seen| seen.running).await;
+    let kept =
+        rig.drive.set_setpoint(Frequency::from_hertz(5).into()).await.expect_err("only a start shows it");
+    assert!(kept.only_a_start_shows(), "{kept}");
+    let refused = rig.drive.start(Direction::Forward).await.expect_err("another has started it").to_string();
+    assert!(refused.contains("stop the motor first") && !refused.contains("a setpoint alone"), "{refused}");
+}
+
 /// 0012h of a VF-S15 is UL, the upper limit, and 3104 of an Altivar HSP, both in a register that somebody may lower while the motor runs.
 #[tokio::test(start_paused = true)]
 async fn a_limit_below_the_setpoint_is_refused_before_it_is_given_and_told_of_a_motor_that_runs() {

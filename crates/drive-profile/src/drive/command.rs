@@ -25,6 +25,11 @@ const NOT_OURS: Refusal = Refusal::Overridden {
     by: "a run command that this side has not given",
     remedy: "stop the motor first, and see what else commands it; a setpoint alone changes the speed of one that runs",
 };
+/// The same where the setpoint is the run command: no setpoint goes to such a motor either.
+const NOT_OURS_AT_ALL: Refusal = Refusal::Overridden {
+    by: "a run command that this side has not given",
+    remedy: "stop the motor first, and see what else commands it; its setpoint is its run command, which goes only to a motor that this side has started",
+};
 const NO_SUCH_START: Error =
     Error::Unsupported { what: "a start in this direction", reason: "its profile does not say how" };
 const NOT_ALONE: Refusal = Refusal::Settings(
@@ -63,7 +68,8 @@ impl<P: Port> ProfileDrive<P> {
         let was_fed = matches!(status.state, State::Running | State::Stopping);
         // One whose run command was taken back may have another's by now: it is not started before it stands.
         let runs = was_fed && (self.comes_down.is_none() || self.withdrawn_at.is_some());
-        let others = (runs && self.watch.run.lease().is_none()).then_some(NOT_OURS);
+        let not_ours = if self.profile.file().starts_by_setpoint() { NOT_OURS_AT_ALL } else { NOT_OURS };
+        let others = (runs && self.watch.run.lease().is_none()).then_some(not_ours);
         match status.bars_motion().or(local).or(others) {
             Some(reason) => Err(self.refused(order, reason)),
             None => Ok((was_fed, words)),

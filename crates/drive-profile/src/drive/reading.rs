@@ -26,6 +26,11 @@ const OTHER_REFERENCE: Refusal = Refusal::Overridden {
     by: "another setpoint than was given",
     remedy: "see who else writes to this drive, and that its reference is that of the bus",
 };
+/// The same where the drive tells itself what 100 % is: whichever of both was changed, the motor is to turn at another speed.
+const OTHER_SCALE: Refusal = Refusal::Overridden {
+    by: "another setpoint than was given, or another frequency that is its 100 %,",
+    remedy: "see who else writes to this drive, whether its 100 % was changed, and that its reference is that of the bus",
+};
 const OTHER_WORD: Refusal = Refusal::Overridden {
     by: "another command word than was written",
     remedy: "see who else writes to this drive",
@@ -267,6 +272,9 @@ impl<P: Port> ProfileDrive<P> {
         let seen = self.agreed.and_then(|_| self.setpoint_seen(words));
         let other = seen.is_some() && ![self.agreed, self.agreed_before].contains(&seen);
         let reference = match owned(&self.sight, words, self.sight.reference_by.as_ref()) {
+            _ if other && matches!(self.sight.full_scale, Some(FullScale::Register(_))) => {
+                Told::No(OTHER_SCALE)
+            }
             _ if other => Told::No(OTHER_REFERENCE),
             Told::Yes if self.agreed.is_none() || !self.turns_as_commanded(status) => Told::NotTold,
             told => told,
