@@ -23,7 +23,7 @@ struct OnBrokers;
 
 const ROW: Key = Key::of_table(
     "[mqtt]",
-    &["the [MQTT broker](#mqtt), and [`[mqtt.sparkplug]`](#sparkplug)"],
+    &["the [MQTT broker](mqtt.md), and [`[mqtt.sparkplug]`](sparkplug.md)"],
     "none: nothing is told to a broker",
 );
 

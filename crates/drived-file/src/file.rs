@@ -40,16 +40,16 @@ settings! {
     /// unless the path is whole
     state: PathBuf = "the folder that systemd names in `STATE_DIRECTORY`; else one of this user for this configuration, in `$XDG_STATE_HOME/drived` or `~/.local/state/drived`",
         |to, said| to.kept.state = Some(said.clone());
-    /// another file for the [tokens](#rights-and-tokens); beside the configuration unless the path is whole
+    /// another file for the [tokens](rights-and-audit.md#rights-and-tokens); beside the configuration unless the path is whole
     tokens: PathBuf = "in the state folder", |to, said| to.kept.tokens = Some(said.clone());
-    /// another file for the [audit log](#audit-log); beside the configuration unless the path is whole
+    /// another file for the [audit log](rights-and-audit.md#audit-log); beside the configuration unless the path is whole
     audit: PathBuf = "in the state folder; none where that is the user's own",
         |to, said| to.kept.audit = Some(said.clone());
-    /// the file that keeps what each drive's communication watchdog was before it was armed, for [the exit](#how-it-ends) of the
+    /// the file that keeps what each drive's communication watchdog was before it was armed, for [the exit](daemon.md#how-it-ends) of the
     /// next run if this one is killed
     watchdogs: PathBuf = "`watchdogs.json` in the state folder",
         |to, said| to.kept.watchdogs = Some(said.clone());
-    /// a folder of [profiles](#drives-from-files), for drives that are not built in; beside the configuration unless the path is whole
+    /// a folder of [profiles](families.md#drives-from-files), for drives that are not built in; beside the configuration unless the path is whole
     profiles: PathBuf = "those that are shipped";
     /// the lines, each with a name
     lines as "[lines.NAME]": LineEntries = "one must be given";
@@ -59,9 +59,9 @@ settings! {
     defaults as "[defaults]": DriveEntry = "none";
     /// `NAME = ["pump 1", "pump 2"]`: drives that are commanded together by one name
     groups as "[groups]": GroupEntries = "none";
-    /// the [HTTP server](#http-server)
+    /// the [HTTP server](http.md)
     http as "[http]": HttpEntry = "`127.0.0.1:7580`";
-    /// `path` and `mode` of the [control socket](#commands-through-the-daemon)
+    /// `path` and `mode` of the [control socket](commands-and-monitor.md#commands-through-the-daemon)
     socket as "[socket]": SocketEntry = "as there, `\"0660\"`";
 }
 

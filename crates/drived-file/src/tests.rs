@@ -684,18 +684,31 @@ fn taken(section: &str) -> std::collections::BTreeSet<String> {
     all.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 
-/// The keys of the table of the README with this head.
+/// The chapters of the manual, one behind the other.
+fn manual() -> String {
+    let folder = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../drived/docs")).unwrap();
+    let mut chapters: Vec<_> = folder.map(|entry| entry.unwrap().path()).collect();
+    chapters.sort();
+    chapters.into_iter().map(|chapter| std::fs::read_to_string(chapter).unwrap()).collect()
+}
+
+/// The rows of the table of the manual with this head.
+fn rows(manual: &str, head: &str) -> Vec<String> {
+    let rows = manual.lines().skip_while(|line| !line.starts_with(&format!("| {head} | Is |"))).skip(2);
+    rows.take_while(|row| row.starts_with('|')).map(str::to_owned).collect()
+}
+
+/// The keys of the table of the manual with this head.
 fn documented(head: &str) -> std::collections::BTreeSet<String> {
-    let readme = include_str!("../../drived/README.md");
-    let rows = readme.lines().skip_while(|line| !line.starts_with(&format!("| {head} | Is |"))).skip(2);
-    let firsts = rows.map_while(|row| row.strip_prefix("| ")?.split(" | ").next());
+    let rows = rows(&manual(), head);
+    let firsts = rows.iter().map_while(|row| row.strip_prefix("| ")?.split(" | ").next());
     let keys = firsts.flat_map(|first| first.split('`').skip(1).step_by(2));
     let bare = |key: &str| key.trim_matches(['[', ']']).rsplit('.').next().unwrap_or_default().to_owned();
     keys.map(bare).collect()
 }
 
 #[test]
-fn the_readme_has_every_key_of_the_file_and_no_other() {
+fn the_manual_has_every_key_of_the_file_and_no_other() {
     for (head, section) in
         [("`[http]`", "[http]"), ("`[mqtt.sparkplug]`", "[mqtt]\nservers = []\n[mqtt.sparkplug]")]
     {
@@ -707,14 +720,12 @@ fn the_readme_has_every_key_of_the_file_and_no_other() {
 }
 
 #[test]
-fn the_readme_says_of_each_key_what_its_table_declares() {
-    let readme = include_str!("../../drived/README.md");
+fn the_manual_says_of_each_key_what_its_table_declares() {
+    let manual = manual();
     read(FULL).unwrap();
     for (head, keys) in tables() {
-        let rows = readme.lines().skip_while(|line| !line.starts_with(&format!("| {head} | Is |"))).skip(2);
-        let rows: Vec<&str> = rows.take_while(|row| row.starts_with('|')).collect();
         let declared: Vec<String> = keys.iter().map(|key| key.row()).collect();
-        assert_eq!(rows, declared, "expected\n{}", declared.join("\n"));
+        assert_eq!(rows(&manual, &head), declared, "expected\n{}", declared.join("\n"));
     }
 }
 
@@ -738,7 +749,7 @@ fn called_a_file_of_the_state_folder() -> std::collections::BTreeSet<String> {
 }
 
 #[test]
-fn the_readme_lists_every_file_of_the_state_folder_and_no_other() {
+fn the_manual_lists_every_file_of_the_state_folder_and_no_other() {
     let folder = Folder::new("state-files");
     std::fs::write(folder.file("drives.toml"), format!("state = \".\"\n{BROKER}")).unwrap();
     let state = Config::load(&folder.file("drives.toml")).unwrap().doors.state;
@@ -746,8 +757,8 @@ fn the_readme_lists_every_file_of_the_state_folder_and_no_other() {
     let own = [state.bd_seq(source, None), state.tokens, state.audit, state.watchdogs];
     let own = own.into_iter().map(|file| file.unwrap().file_name().unwrap().to_str().unwrap().to_owned());
     let kept: std::collections::BTreeSet<String> = own.chain(called_a_file_of_the_state_folder()).collect();
-    let readme = include_str!("../../drived/README.md");
-    let row = readme.lines().find_map(|line| line.strip_prefix("| `state` | ")).unwrap();
+    let manual = include_str!("../../drived/docs/configuration.md");
+    let row = manual.lines().find_map(|line| line.strip_prefix("| `state` | ")).unwrap();
     let (list, _) = row.split_once(';').unwrap();
     let listed = list.split('`').skip(1).step_by(2).map(str::to_owned).collect();
     assert_eq!(kept, listed);

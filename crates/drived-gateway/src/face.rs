@@ -19,7 +19,7 @@ pub const FACE: &dyn Face = &ForScada;
 
 struct ForScada;
 
-const ROW: Key = Key::of_table("[[gateways]]", &["[Modbus TCP gateways](#modbus-tcp-gateway)"], "none");
+const ROW: Key = Key::of_table("[[gateways]]", &["[Modbus TCP gateways](gateway.md)"], "none");
 
 impl Face for ForScada {
     fn table(&self) -> &'static str {

@@ -1,5 +1,5 @@
 //! A unit that no line has: all drives of the daemon in few reads. What stands where is one table, for the code, for
-//! `drived export gateway-map` and for the README.
+//! `drived export gateway-map` and for the manual.
 
 use std::{
     collections::HashMap,

@@ -44,7 +44,7 @@ struct BlackBox;
 
 const ROW: Key = Key::of_table(
     "[history]",
-    &["what the [history](#history) keeps"],
+    &["what the [history](history.md) keeps"],
     "values of two days, minutes of 90 days, and hours, events, alarms and commands of ten years, in 2 GiB at the most",
 );
 

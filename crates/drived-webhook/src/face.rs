@@ -42,7 +42,11 @@ const LAST_WORDS: Duration = Duration::from_secs(5);
 
 struct OfAlarms;
 
-const ROW: Key = Key::of_table("[[webhooks]]", &["[who is told of alarms](#webhooks) by a POST"], "none");
+const ROW: Key = Key::of_table(
+    "[[webhooks]]",
+    &["[who is told of alarms](alarms-and-webhooks.md#webhooks) by a POST"],
+    "none",
+);
 
 impl Face for OfAlarms {
     fn table(&self) -> &'static str {

@@ -15,7 +15,7 @@ fn objects(arguments: &[&str]) -> Vec<Value> {
 #[test]
 fn families_and_registers_are_told_as_their_tables_have_them() {
     let families = objects(&["families"]);
-    // The README: five families, and twenty drives from files.
+    // The manual: five families, and twenty drives from files.
     assert_eq!(families.len(), 5 + 20);
     let [atv58] = &objects(&["families", "atv58"])[..] else { panic!("one object") };
     assert!(families.contains(atv58));
@@ -41,7 +41,7 @@ fn a_configuration_and_its_plan_are_told_with_the_figures_of_the_tables() {
     assert!(said.assert_done().contains(meaning), "{meaning}");
     let planned = objects(&["plan", "--config", file]);
     assert_eq!(planned.len(), 2);
-    // The README's example prints 857 ms and 66.00 % for this line.
+    // The manual's example prints 857 ms and 66.00 % for this line.
     let north = &planned[0]["cases"][0];
     assert_eq!((&planned[0]["line"], &north["works"]), (&"north".into(), &true.into()));
     assert_eq!(north["cycle_us"].as_u64().map(|micros| micros.div_ceil(1_000)), Some(857));

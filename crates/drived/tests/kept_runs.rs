@@ -350,7 +350,7 @@ fn a_motor_of_a_client_that_has_to_be_heard_is_stopped_when_line_drive_and_gatew
 }
 
 #[test]
-fn what_a_run_leaves_in_its_state_folder_is_what_the_readme_lists() {
+fn what_a_run_leaves_in_its_state_folder_is_what_the_manual_lists() {
     let plant = Plant::new("kept-files");
     run(&["token", "add", "scada", "--role", "view", "--config", plant.file.path()]).assert_done();
     let (mut daemon, _client) = Client::of(&plant);
@@ -360,8 +360,8 @@ fn what_a_run_leaves_in_its_state_folder_is_what_the_readme_lists() {
     let left: Vec<String> = folder
         .map(|entry| entry.expect("it can be read").file_name().into_string().expect("it is text"))
         .collect();
-    let readme = include_str!("../README.md");
-    let row = readme.lines().find_map(|line| line.strip_prefix("| `state` | ")).expect("it is documented");
+    let manual = include_str!("../docs/configuration.md");
+    let row = manual.lines().find_map(|line| line.strip_prefix("| `state` | ")).expect("it is documented");
     let (list, _) = row.split_once(';').expect("the list ends");
     let listed: Vec<&str> = list.split('`').skip(1).step_by(2).collect();
     // Some have more beside them, by their own name: the log of SQLite, the audit log before this one.

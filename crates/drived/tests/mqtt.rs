@@ -209,7 +209,7 @@ fn number(line: &str) -> String {
 }
 
 #[test]
-fn a_broker_is_verified_and_its_access_list_as_the_readme_has_it_keeps_commanders_apart() {
+fn a_broker_is_verified_and_its_access_list_as_the_manual_has_it_keeps_commanders_apart() {
     let tls = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/tls");
     let folder = path("mqtt-tls-files");
     fs::create_dir_all(&folder).expect("it can be made");
@@ -217,9 +217,9 @@ fn a_broker_is_verified_and_its_access_list_as_the_readme_has_it_keeps_commander
     for name in ["certificate.pem", "key.pem"] {
         fs::copy(tls.join(name), folder.join(name)).expect("it can be copied");
     }
-    let readme = include_str!("../README.md");
+    let manual = include_str!("../docs/mqtt.md");
     let list =
-        readme.split_once("```text\n# the daemon").expect("the list").1.split_once("```").expect("its end").0;
+        manual.split_once("```text\n# the daemon").expect("the list").1.split_once("```").expect("its end").0;
     fs::write(place("acl"), format!("# the daemon{list}")).expect("it can be written");
     fs::write(place("password"), "drived-secret\n").expect("it can be written");
     fs::set_permissions(place("password"), fs::Permissions::from_mode(0o600)).expect("it is ours");

@@ -13,7 +13,7 @@ use super::{
     source::Source,
 };
 
-/// Commands as the README of `drived` has them, and what is wrong in a way of its own.
+/// Commands as the manual of `drived` has them, and what is wrong in a way of its own.
 const COMMANDS: &[&str] = &[
     r#"{"id": "a1", "action": "start", "direction": "forward", "setpoint": {"frequency_hz": 25.5}, "expires_in_ms": 1000}"#,
     r#"{"id": "a2", "action": "stop", "mode": "ramp"}"#,

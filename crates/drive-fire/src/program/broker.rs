@@ -1,6 +1,6 @@
 //! A broker of MQTT v5 that only the daemon talks to: it lets it in, grants what it asks for, brings back what it says to itself, keeps
 //! what it has said last, and gives it whatever it is to be given, packets that are none among it (OASIS MQTT 5.0, section 3). What the
-//! README of `drived` says of every connection and every message of the daemon is held here against each of them.
+//! manual of `drived` says of every connection and every message of the daemon is held here against each of them.
 
 use std::{
     collections::VecDeque,

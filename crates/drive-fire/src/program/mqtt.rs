@@ -16,7 +16,7 @@ use crate::fuzz::{Source, change};
 /// How long the daemon may take to be there again, and to tell what became of a command.
 const LONGEST: Duration = Duration::from_secs(40);
 
-/// Topics of commands, as the README of drived has them; `hmi` may stop and nothing else.
+/// Topics of commands, as the manual of drived has them; `hmi` may stop and nothing else.
 const TOPICS: &[&str] = &[
     "drived/drive/pump_1/command/hmi",
     "drived/drive/pump_2/stop/hmi",

@@ -1,4 +1,4 @@
-//! What the README of `drived` says of commands at a broker, asked of the program one by one: who may not, what is kept, late, old or
+//! What the manual of `drived` says of commands at a broker, asked of the program one by one: who may not, what is kept, late, old or
 //! without a name moves no motor; a stop is taken whatever it looks like; whoever asks is answered, and nobody else is asked by that.
 
 use std::{

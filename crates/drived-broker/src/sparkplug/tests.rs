@@ -384,8 +384,8 @@ fn what_is_old_is_stale_with_its_last_value_and_what_was_never_read_is_bad_witho
 }
 
 #[test]
-fn the_readme_lists_every_metric_with_its_type() {
-    let manual = include_str!("../../../drived/README.md");
+fn the_manual_lists_every_metric_with_its_type() {
+    let manual = include_str!("../../../drived/docs/sparkplug.md");
     let owners = [Owner::Program, Owner::Line("<line>".to_owned()), Owner::Drive("<drive>".to_owned())];
     let node = metrics::of_the_node(&["<line>".to_owned()], &owners);
     for Definition { name, data_type } in node.into_iter().chain(metrics::of_a_drive()) {

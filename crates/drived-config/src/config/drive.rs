@@ -44,7 +44,7 @@ settings! {
     name: String = "line and address";
     /// whether its family is a guess, which nobody has compared with the nameplate: the page says so before control of it is taken
     guessed: bool = "`false`";
-    /// its number, from 0, in the [virtual unit](#the-virtual-unit); of several drives that of the first, and the others follow
+    /// its number, from 0, in the [virtual unit](gateway.md#the-virtual-unit); of several drives that of the first, and the others follow
     slot: u16 = "the next that nobody has had";
     /// whether it may be commanded; otherwise it is only read
     control: bool = "`false`",

@@ -48,7 +48,7 @@ settings! {
     /// `[lines.NAME]`.
     LineEntry sets Draft;
 
-    /// the line, [as above](#how-lines-and-drives-are-named); a serial port or a serial server is one line's only
+    /// the line, [named as on the command line](../README.md#how-lines-and-drives-are-named); a serial port or a serial server is one line's only
     port: Parsed<LineSpec> = "must be given";
     /// the longest time that an answer may take, 10 ms to 10 s; a stop waits for an answer that does not come
     response_timeout: Parsed<Time> = "`\"200ms\"`",

@@ -1,6 +1,6 @@
 //! What a table of the file takes, each key declared once: what it means, its default, how it is read, what it sets, and what
 //! it comes to. The form that is read, the checks of single keys, the answers of `drived check`, the manual's page and the
-//! README follow from the declaration.
+//! manual's table follow from the declaration.
 
 use std::{fmt, ops::Range, ops::RangeInclusive};
 
@@ -53,7 +53,7 @@ impl Key {
         self.default
     }
 
-    /// Its row in the README.
+    /// Its row in the manual of `drived`.
     pub fn row(&self) -> String {
         format!("| `{}` | {} | {} |", self.name, self.meaning(), self.default)
     }
@@ -89,7 +89,7 @@ pub trait Entry {
 /// Declares a table of the file, one entry a key:
 ///
 /// ```text
-/// /// what it means, as the README says it
+/// /// what it means, as the manual says it
 /// key: TypeThatIsRead = "what holds without it",
 ///     acts(PATTERN), // that which is said only has a meaning for a drive under control
 ///     |draft, said| what_it_sets?, // where it sets something by itself

@@ -21,7 +21,7 @@ use drived_doors::{Caller, Rights};
 use drived_plant::plant::testing::TestPlant;
 
 /// Where the table of the metrics is written down.
-const DOCUMENT: &str = "../drived/METRICS.md";
+const DOCUMENT: &str = "../drived/docs/metrics.md";
 
 /// The doors' router of a plant, for somebody with these rights.
 fn router(plant: &TestPlant, rights: Rights) -> Router {

@@ -1,4 +1,4 @@
-//! Every metric there is, in one table: what is written at `/metrics`, the table of METRICS.md, and what alert rules and the
+//! Every metric there is, in one table: what is written at `/metrics`, the table of the manual, and what alert rules and the
 //! board may name are all made of it, or checked against it.
 
 use std::time::Duration;

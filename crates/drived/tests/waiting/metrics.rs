@@ -10,7 +10,7 @@ use std::{
 use crate::support::{File, Running, Sim, free_port, get, is_there, path, python_with, run};
 
 /// The table that a test in the crate holds against the code.
-const DOCUMENT: &str = include_str!("../../METRICS.md");
+const DOCUMENT: &str = include_str!("../../docs/metrics.md");
 
 /// Five families on one line, the first tripped and the second without power.
 struct Plant {

@@ -374,7 +374,7 @@ impl Plant {
         }
     }
 
-    /// As the README has the overview: flags, frequency in 0.01 Hz, current in 0.1 A, age in 0.1 s.
+    /// As the manual has the overview: flags, frequency in 0.01 Hz, current in 0.1 A, age in 0.1 s.
     fn virtual_unit(&self, slot: u16) -> Said {
         let words = self.words(247, 16 + 4 * slot, 4).expect("it is answered without the line");
         let known = |word: u16| Some(word).filter(|word| *word != 0xFFFF).map(i64::from);

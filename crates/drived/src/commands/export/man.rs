@@ -126,7 +126,7 @@ fn marked(text: &str) -> Vec<Inline> {
 /// Markdown without its marks, and without where its links lead.
 fn plain(text: &str) -> String {
     let text = text.replace('`', "");
-    let mut parts = text.split("](#");
+    let mut parts = text.split("](");
     let first = parts.next().unwrap_or_default().to_owned();
     parts.fold(first, |mut text, rest| {
         if let Some(link) = text.rfind('[') {
