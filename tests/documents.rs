@@ -1,4 +1,4 @@
-//! The documents for whoever works on this house name only what exists.
+//! Documents name only what exists: those for whoever works on this house files and tests, and all of them what they link to.
 
 use std::{
     collections::BTreeSet,
@@ -35,10 +35,87 @@ fn collect_functions(folder: &Path, found: &mut BTreeSet<String>) {
     }
 }
 
-/// The files that a document links to, without their places.
-fn linked(text: &str) -> Vec<String> {
-    let targets = text.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next());
-    targets.filter(|target| !target.is_empty() && !target.contains("://")).map(str::to_owned).collect()
+/// Every document in a folder and those below it.
+fn collect_documents(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("it is a folder") {
+        let path = entry.expect("it is listed").path();
+        // A link is the same document, with another folder around it.
+        if path.is_symlink() || path.ends_with("target") {
+            continue;
+        }
+        if path.is_dir() {
+            collect_documents(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "md") {
+            found.push(path);
+        }
+    }
+}
+
+/// Where a document links to, outside its blocks of code: each file, and the place in it.
+fn linked(text: &str) -> Vec<(String, String)> {
+    let prose: String = text.split("```").step_by(2).collect();
+    let targets = prose.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    let ours = targets.filter(|target| !target.contains("://") && !target.contains(char::is_whitespace));
+    let parts = ours.map(|target| target.split_once('#').unwrap_or((target, "")));
+    parts.map(|(file, place)| (file.to_owned(), place.to_owned())).collect()
+}
+
+/// The places of a document that can be linked to, as a forge makes them of its headings.
+fn places(text: &str) -> BTreeSet<String> {
+    let prose: String = text.split("```").step_by(2).collect();
+    let headings = prose.lines().filter(|line| line.starts_with('#'));
+    let place = |heading: &str| -> String {
+        let heading = heading.trim_start_matches('#').trim().to_lowercase();
+        let kept = heading.chars().filter(|letter| letter.is_alphanumeric() || " -_".contains(*letter));
+        kept.map(|letter| if letter == ' ' { '-' } else { letter }).collect()
+    };
+    headings.map(place).collect()
+}
+
+#[test]
+fn every_link_of_a_document_leads_to_what_is_there() {
+    let mut documents = vec![root().join("README.md")];
+    for folder in [".github", "crates", "examples"] {
+        collect_documents(&root().join(folder), &mut documents);
+    }
+    assert!(documents.len() > 60, "{documents:?}");
+    for document in documents {
+        let text = fs::read_to_string(&document).expect("it is text");
+        for (file, place) in linked(&text) {
+            let folder = document.parent().expect("it is in a folder");
+            let target = if file.is_empty() { document.clone() } else { folder.join(&file) };
+            assert!(target.exists(), "{} links to {file}", document.display());
+            if !place.is_empty() {
+                let there = fs::read_to_string(&target).expect("it is text");
+                let is_there = places(&there).contains(&place);
+                assert!(is_there, "{} links to {file}#{place}", document.display());
+            }
+        }
+    }
+}
+
+/// What is longer is read by nobody.
+const LONGEST_CHAPTER: usize = 250;
+
+#[test]
+fn the_manual_lists_each_of_its_chapters_which_leads_back() {
+    let folder = root().join("crates/drived");
+    let readme = fs::read_to_string(folder.join("README.md")).expect("it is there");
+    assert!(readme.lines().count() <= LONGEST_CHAPTER);
+    let (_, list) = readme.split_once("\n## The chapters\n").expect("it has a list");
+    let mut chapters = Vec::new();
+    collect_documents(&folder.join("docs"), &mut chapters);
+    assert!(chapters.len() > 15, "{chapters:?}");
+    for chapter in chapters {
+        let name = chapter.file_name().and_then(|name| name.to_str()).expect("it has a name");
+        assert!(list.contains(&format!("](docs/{name})")), "{name} is not listed");
+        let text = fs::read_to_string(&chapter).expect("it is text");
+        assert!(
+            text.starts_with("[The manual of `drived`](../README.md)\n\n# "),
+            "{name} does not lead back"
+        );
+        assert!(text.lines().count() <= LONGEST_CHAPTER, "{name} is long");
+    }
 }
 
 #[test]
@@ -52,10 +129,6 @@ fn every_file_that_a_document_names_is_there() {
             // `tests/manual.rs` is every family's.
             let of_a_crate = crates.iter().any(|folder| folder.path().join(&path).exists());
             assert!(of_a_crate || root.join(&path).exists(), "{document} names {path}");
-        }
-        let folder = root.join(document).parent().expect("it is in a folder").to_owned();
-        for path in linked(&text) {
-            assert!(folder.join(&path).exists(), "{document} links to {path}");
         }
     }
 }
