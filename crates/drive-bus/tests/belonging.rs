@@ -134,6 +134,36 @@ fn a_slave_has_its_pause_behind_an_answer_that_came_late() {
     assert!(line.now >= late + 40 * MS, "{:?}", line.now - late);
 }
 
+/// What comes behind an answer, and nobody is owed, was its own too. A slave that never stops talking holds up no stop beyond its bound.
+#[test]
+fn a_stop_that_waits_gives_its_slave_its_pause_behind_a_stray_and_keeps_its_bound_behind_many() {
+    let pause = SlaveSettings { turnaround: 40 * MS, ..SlaveSettings::default() };
+    let answered_with_a_stop_behind = || {
+        let mut line = ByHand::new(once().slave(1, pause));
+        line.ask(1, 1, READ, Terms::default());
+        let request = line.sent();
+        line.answers(&request, &words(&[1, 1]));
+        line.ask(2, 1, STOP, Terms::of(Class::Stop));
+        line
+    };
+    let mut line = answered_with_a_stop_behind();
+    line.hears(30 * MS, &rtu::frame(1, &words(&[1, 9, 9])));
+    let stray = line.now;
+    line.sent();
+    assert!(line.now >= stray + 40 * MS, "{:?}", line.now - stray);
+
+    let mut line = answered_with_a_stop_behind();
+    let (asked, bound) = (line.now, once().slave(1, pause).worst_case_stop(8, 8));
+    let sent = loop {
+        if line.next_sent(line.now + 30 * MS).is_some() {
+            break line.now;
+        }
+        line.hears(30 * MS, &rtu::frame(1, &words(&[1, 9, 9])));
+        assert!(line.now < asked + 2 * bound, "it is never sent");
+    };
+    assert!(sent > asked + 40 * MS && sent - asked <= bound, "{:?} of {bound:?}", sent - asked);
+}
+
 #[test]
 fn what_is_owed_is_asked_for_by_nobody_for_a_minute() {
     let mut line = ByHand::after_a_question_in_vain(once(), READ, Terms::default().sparing(3), 2_000 * MS);

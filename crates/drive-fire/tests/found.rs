@@ -133,6 +133,10 @@ fn no_story_that_was_a_find_is_one_again() {
             "the stop of a 58 on UNI-TELWAY that never ended: it was put aside while a port opened anew was listened to",
         ),
         (
+            "3.4.0.f7x1.o2.f60x2.o9",
+            "a 312 over Modbus TCP whose answer had another one in its middle: the stage was wrong",
+        ),
+        (
             "4.0.0.f70x4.o5",
             "a start that was confirmed four seconds ago, before the process stood still: the judge was wrong",
         ),

@@ -148,6 +148,11 @@ impl Station {
         self.ready_at = self.ready_at.max(Some(until + self.settings.turnaround));
     }
 
+    /// Whether a pause that begins now is over by then.
+    pub(super) fn pauses_before(&self, now: Instant, by: Instant) -> bool {
+        now + self.settings.turnaround <= by
+    }
+
     /// Whether only a long question is worth asking, because its own time was set or because it was heard late.
     pub(super) const fn wants_long(&self) -> bool {
         self.slow || self.settings.response_timeout.is_some()

@@ -68,7 +68,8 @@ impl<C> Master<C> {
         let asked = asked.map(|flight| flight.request.function_code().value());
         let confuses = self.exchange.confuses_late_answers();
         let with_next = asked.is_some();
-        let stop_waits = self.schedule.first_stop(|entry| (entry.slave == slave).then_some(now)).is_some();
+        let stop = self.schedule.first_stop(|entry| (entry.slave == slave).then_some(entry.arrived));
+        let stop_by = stop.map(|arrived| arrived + self.learned_worst_case_stop());
         let Some(station) = self.stations.get_mut(&slave) else {
             self.stats.foreign += 1;
             let what = if is_request { What::OthersRequest } else { What::OthersAnswer };
@@ -96,8 +97,8 @@ impl<C> Master<C> {
         if late {
             station.heard_late(now);
             self.offline.hope(now, slave);
-        } else if !is_request && !stop_waits {
-            // Whatever it was, it was its own: it needs its pause. A stop that waits does not wait anew for each of them.
+        } else if !is_request && stop_by.is_none_or(|by| station.pauses_before(now, by)) {
+            // Whatever it was, it was its own: it needs its pause. A stop that waits does so for none of them beyond its bound.
             station.spoke(now);
         }
         match asked {

@@ -174,6 +174,14 @@ impl Cable {
             self.due.sort_by_key(|(at, _)| *at);
             while self.due.first().is_some_and(|(at, _)| *at <= now) {
                 let (_, bytes) = self.due.remove(0);
+                // On one connection what comes byte by byte comes to its end first.
+                if let Some(last) =
+                    self.still_coming().filter(|_| self.tap.way == Way::ModbusTcp && bytes.len() > 1)
+                {
+                    self.due.push((last + Duration::from_millis(1), bytes));
+                    self.due.sort_by_key(|(at, _)| *at);
+                    continue;
+                }
                 self.tap.plan().trace_bytes(self.tap.way, "heard late", &bytes);
                 if self.far.write_all(&bytes).await.is_err() {
                     return;
@@ -388,11 +396,16 @@ impl Cable {
             _ => {}
         }
         // What is said behind something that is still coming comes behind it.
-        if let Some(last) = self.due.iter().filter(|(_, bytes)| bytes.len() == 1).map(|(at, _)| *at).max() {
+        if let Some(last) = self.still_coming() {
             self.due.push((last + Duration::from_millis(1), answer));
             return true;
         }
         answer.is_empty() || self.far.write_all(&answer).await.is_ok()
+    }
+
+    /// When the last byte of what comes byte by byte is there.
+    fn still_coming(&self) -> Option<Instant> {
+        self.due.iter().filter(|(_, bytes)| bytes.len() == 1).map(|(at, _)| *at).max()
     }
 
     fn flip(&self, bytes: &mut [u8], bits: u8) {
