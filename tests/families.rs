@@ -4,7 +4,7 @@ use drive_bus::{
     Protocol,
     protocol::{AsciiSettings, NetworkHeader, UniTelwaySettings},
 };
-use drive_core::{SerialSettings, serial::CharacterFormat};
+use drive_core::{Faults, SerialSettings, State, serial::CharacterFormat};
 use drive_families::Family;
 use support::contracts::contract;
 
@@ -51,4 +51,20 @@ async fn an_altivar_312_starts_reverses_stops_trips_and_recovers() {
 #[tokio::test(start_paused = true)]
 async fn a_3g3ev_starts_reverses_stops_trips_and_recovers() {
     contract(Family::OMRON_3G3EV).lives_the_story().await;
+}
+
+/// LFt 0 is nOF, "no fault" (ATV312 BBV51701 p. 24, ATV28 p. 22), and so is FC90 0 of an Altivar 21: the status word has tripped all the same.
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_has_tripped_and_names_no_fault_is_told_as_that_and_as_no_code() {
+    for family in [Family::ATV21, Family::ATV28, Family::ATV312] {
+        let mut rig = contract(family).rig();
+        let name = family.capabilities().name;
+        let stands = rig.drive.faults().await.expect(name);
+        assert_eq!((stands.tripped, stands.present), (false, vec![]), "{name}");
+        rig.machine.trip(0);
+        let status = rig.until("it has tripped", |status| status.state == State::Fault).await;
+        assert_eq!(status.fault_code, None, "{name}");
+        let Faults { tripped, present, .. } = rig.drive.faults().await.expect(name);
+        assert_eq!((tripped, present), (true, vec![]), "{name}");
+    }
 }

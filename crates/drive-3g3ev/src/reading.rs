@@ -83,10 +83,12 @@ impl<P: Port> Drive3g3ev<P> {
             // Without it no fault is known, and that there is none is not either: its exception says so.
             None => self.registers.at(Class::Background).read(ERRORS).await?,
         };
+        let tripped = errors != 0 || FastWords::of(words.clone()).is_tripped();
         Ok(Faults {
             present: present(Errors::from_bits_retain(errors)),
             history: Vec::new(),
             warnings: warnings(&words.pairs()),
+            tripped,
             reset_allowed: None,
         })
     }

@@ -63,10 +63,13 @@ impl FastWords {
         if self.state.contains(DriveState::LOCAL_RUN) { Control::Local } else { Control::Bus }
     }
 
-    fn drive_state(&self, command: Option<Command>) -> State {
-        let fault = self.signals.contains(Signals::FAULT)
+    pub(crate) fn is_tripped(&self) -> bool {
+        self.signals.contains(Signals::FAULT)
             || self.errors.is_some_and(|errors| errors.bits() != 0)
-            || self.state.contains(DriveState::MAJOR_FAULT);
+            || self.state.contains(DriveState::MAJOR_FAULT)
+    }
+
+    fn drive_state(&self, command: Option<Command>) -> State {
         let running = self.signals.contains(Signals::RUN) || self.state.contains(DriveState::RUN);
         let turning =
             self.output.is_some_and(|output| output != 0) && !self.state.contains(DriveState::OUTPUT_OFF);
@@ -79,7 +82,7 @@ impl FastWords {
             && !self.state.contains(DriveState::UNDERVOLTAGE);
         let stop_ordered =
             self.control() == Control::Bus && command.is_some_and(|command| !command.contains(Command::RUN));
-        if fault {
+        if self.is_tripped() {
             State::Fault
         } else if running && stop_ordered {
             State::Stopping

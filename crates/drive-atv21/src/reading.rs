@@ -157,6 +157,8 @@ impl<P: Port> Atv21<P> {
     }
 
     pub(crate) async fn read_faults(&mut self) -> Result<Faults> {
+        let word = self.registers.at(Class::Background).read(map::STATUS_WORD).await?;
+        let tripped = StatusWord::from_bits_retain(word).contains(StatusWord::TRIPPED);
         let present = fault(self.fault_code(Class::Background).await?);
         let mut history = Vec::with_capacity(HISTORY.len());
         for register in HISTORY {
@@ -165,7 +167,7 @@ impl<P: Port> Atv21<P> {
         }
         let alarm = self.optional(Class::Background, map::ALARM_CODE).await?.unwrap_or(0);
         let warnings = alarms(Alarms::from_bits_retain(alarm));
-        Ok(Faults { present: present.into_iter().collect(), history, warnings, reset_allowed: None })
+        Ok(Faults { present: present.into_iter().collect(), history, warnings, tripped, reset_allowed: None })
     }
 
     /// Reads the drive as it was just before its last trip: FE10, FE00, FE01, FE42, FE49, FE06, FE07, and while it is

@@ -85,11 +85,13 @@ impl<P: Port> Drive for Atv28<P> {
         let state = words.state_words();
         let tripped = state.is_tripped();
         let warnings = WARNINGS.iter().filter(|entry| state.eti.bits() >> entry.code & 1 == 1);
-        let present = words.word(LFT).filter(|_| tripped);
+        // 0 is nOF: no fault.
+        let present = words.word(LFT).filter(|&code| tripped && code != 0);
         Ok(Faults {
             present: present.map(|code| Fault::lookup(FAULTS, code)).into_iter().collect(),
             history,
             warnings: warnings.map(|entry| Fault { code: entry.code, entry: Some(entry) }).collect(),
+            tripped,
             reset_allowed: tripped.then(|| state.eti.contains(ExtendedStatus::RESET_AUTHORISED)),
         })
     }

@@ -72,7 +72,7 @@ impl FastWords {
             output_frequency: self.output(),
             reference: Some(self.reference()),
             current: self.word(LCR).map(|word| Current::from_deciamperes(u32::from(word))),
-            fault_code: self.word(LFT).filter(|_| state.is_tripped()),
+            fault_code: self.word(LFT).filter(|&code| state.is_tripped() && code != 0),
             raw: self.raw(),
             ..state.status(command)
         }

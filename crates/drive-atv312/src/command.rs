@@ -188,7 +188,7 @@ impl<P: Port> Drivecom for Atv312<P> {
         let mut status = self.fast_status(class).await?;
         // One word more for a tripped drive, so that the refusal names the fault.
         if status.state == State::Fault {
-            status.fault_code = Some(self.registers.at(class).read(LFT).await?);
+            status.fault_code = Some(self.registers.at(class).read(LFT).await?).filter(|code| *code != 0);
         }
         Ok(status)
     }
@@ -218,7 +218,7 @@ impl<P: Port> Drivecom for Atv312<P> {
         if let Some(reason) = self.recognise_itself().await? {
             return Ok(Some(reason));
         }
-        self.read_settings(Class::Command).await?;
+        self.read_meanings(Class::Command).await?;
         let controls = self.read_controls(Class::Command).await?;
         let words = FastWords::in_status(status).state_words();
         let settings = &self.known.settings;
@@ -238,7 +238,8 @@ impl<P: Port> Drivecom for Atv312<P> {
             }
         }
         match self.refuses_variables(controls, setpoint).await? {
-            None => self.other_reference().await,
+            // By the bits that the start will leave as they are.
+            None => self.judge_reference(self.as_written(0)).await,
             refusal => Ok(refusal),
         }
     }
@@ -355,15 +356,19 @@ impl<P: Port> Drivecom for Atv312<P> {
         self.known.settings.stop(mode)
     }
 
-    async fn corrects_stop(&mut self) -> bool {
+    async fn corrected_stop(&mut self, asked: StopMode, sent: StopWord) -> Option<StopWord> {
         let before = self.known.settings.kept(self.high_bits);
+        let was_known = self.known.settings.knows_stop();
+        if was_known {
+            self.read_meanings(Class::Command).await.ok()?;
+        }
         // A drive that has no LAC never tells them, however often it is asked.
         while !self.known.settings.knows_stop() && !self.known.settings.is_complete() {
-            if self.read_setting(Class::Command).await.is_err() {
-                return false;
-            }
+            self.read_setting(Class::Command).await.ok()?;
         }
-        self.known.settings.kept(self.high_bits) != before
+        // A quick stop that went out while nothing was known is not turned into a slower one.
+        let stop = if was_known { self.known.settings.stop(asked) } else { sent };
+        (stop.word != sent.word || self.known.settings.kept(self.high_bits) != before).then_some(stop)
     }
 
     fn shows_stop(&self, stop: &StopWord, status: &Status) -> bool {

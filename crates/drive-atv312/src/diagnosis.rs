@@ -72,13 +72,19 @@ impl<P: Port> Atv312<P> {
         // LFt keeps the last fault after it is gone: only the state says that it is present.
         let state = words.state_words();
         let tripped = state.is_tripped();
-        let present = last.filter(|_| tripped).map(|code| Fault::lookup(FAULTS, code)).into_iter().collect();
+        // 0 is nOF: no fault.
+        let present = last
+            .filter(|&code| tripped && code != 0)
+            .map(|code| Fault::lookup(FAULTS, code))
+            .into_iter()
+            .collect();
         let past = past.into_iter().flatten().filter(|&code| code != 0);
         let history = past.map(|code| Fault::lookup(FAULTS, code));
         Ok(Faults {
             present,
             history: history.collect(),
             warnings: warnings(state, lrs1),
+            tripped,
             reset_allowed: tripped.then(|| state.eti.contains(ExtendedStatus::RESET_AUTHORISED)),
         })
     }

@@ -31,6 +31,11 @@ impl<P: Port> Atv312<P> {
     pub(crate) async fn other_reference(&mut self) -> Result<Option<Refusal>> {
         self.read_channels(Class::Command).await?;
         let held = self.proof.held().unwrap_or(0);
+        self.judge_reference(held).await
+    }
+
+    /// The same by the settings as they were read last, of a drive that holds this control word.
+    pub(crate) async fn judge_reference(&mut self, held: u16) -> Result<Option<Refusal>> {
         let mut calls = self.registers.at(Class::Command);
         let settings = &self.known.settings;
         let mut facts = Facts::default();

@@ -147,14 +147,19 @@ impl Settings {
         BLOCKS.len()
     }
 
-    fn next_block(&self) -> Option<(usize, Block)> {
+    /// Which blocks count: those of L3, and those of a command channel that is switched by the bus.
+    fn selects(&self) -> (bool, bool) {
         let at_l3 = self.level() == Some(AccessLevel::L3);
-        let switched = self.word(CCS).checked_sub(C111).is_some_and(|bit| bit < 5);
+        (at_l3, at_l3 && self.word(CCS).checked_sub(C111).is_some_and(|bit| bit < 5))
+    }
+
+    fn next_block(&self) -> Option<(usize, Block)> {
+        let (at_l3, switched) = self.selects();
         let mut left = (0..).zip(BLOCKS.iter().copied()).skip(self.blocks);
         left.find(|(_, (_, _, when))| match when {
             Always => true,
             AtL3 => at_l3,
-            Switched => at_l3 && switched,
+            Switched => switched,
         })
     }
 
@@ -481,19 +486,36 @@ impl<P: Port> Atv312<P> {
     /// The settings, and anew those that say whose the reference is: whoever stands at the drive may have set them otherwise since they
     /// were read, and of a motor that stands no word tells it. Below L3 it is the level itself that may have changed.
     pub(crate) async fn read_channels(&mut self, class: Class) -> Result<()> {
-        if !self.known.settings.is_complete() {
-            return self.read_settings(class).await;
-        }
-        let level = self.known.settings.level();
-        let channels: &[u16] = match level {
+        let channels: &[u16] = match self.known.settings.level() {
             Some(AccessLevel::L3) => &[address::RFC, address::FR1],
             _ => &[address::LAC],
         };
-        for (index, _) in BLOCKS.iter().enumerate().filter(|(_, (first, ..))| channels.contains(first)) {
-            self.read_setting_again(class, index).await?;
+        self.read_again(class, channels).await
+    }
+
+    /// The settings, and anew those that decide what a command word does. A drive takes them while its motor stands alone, so that what is
+    /// read for a start holds for its stop.
+    pub(crate) async fn read_meanings(&mut self, class: Class) -> Result<()> {
+        let blocks = BLOCKS.iter().take(FOR_A_STOP.1).map(|(first, ..)| *first);
+        self.read_again(class, &blocks.collect::<Vec<_>>()).await
+    }
+
+    async fn read_again(&mut self, class: Class, blocks: &[u16]) -> Result<()> {
+        if !self.known.settings.is_complete() {
+            return self.read_settings(class).await;
         }
-        if self.known.settings.level() != level {
-            self.known.settings = Known::default().settings;
+        let before = self.known.settings.selects();
+        for (index, _) in BLOCKS.iter().enumerate().filter(|(_, (first, ..))| blocks.contains(first)) {
+            match self.read_setting_again(class, index).await {
+                // Of so many readings one may be lost without the drive being so.
+                Err(error) if error.kind() == ErrorKind::NoAnswer => {
+                    self.read_setting_again(class, index).await?;
+                }
+                read => read?,
+            }
+        }
+        if self.known.settings.selects() != before {
+            self.known.settings = Settings::default();
         }
         self.read_settings(class).await
     }
@@ -569,7 +591,11 @@ impl<P: Port> Atv312<P> {
     /// `CMD`, `LFr`, `PISP` and `CMI` in one exchange.
     pub(crate) async fn read_controls(&mut self, class: Class) -> Result<Controls> {
         let [command, reference, _, cmi] = self.registers.at(class).read_array(CMD.address()).await?;
-        self.hold(command);
+        // Of a word that stands as this side wrote it, the bits above are those that it has kept: what else it holds, such as the bit of a
+        // stop that has another meaning since, was this side's.
+        if self.proof.held() != Some(command) {
+            self.hold(command);
+        }
         self.proof.was_read(command, reference);
         let controls = Controls { command, reference, cmi: ExtendedControl::from_bits_retain(cmi) };
         self.take_extended(controls.cmi);

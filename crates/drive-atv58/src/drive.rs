@@ -72,7 +72,7 @@ impl<P: Port> Drive for Atv58<P> {
         let words = Words::read(&mut self.absent, &mut calls, input, &[W483.address()]).await?;
         let register = FaultRegister(words.at(Some(W483.address())).unwrap_or(0));
         let present = register.bits().map(|code| Fault { code, entry: None }).collect();
-        Ok(Faults { present, ..Faults::default() })
+        Ok(Faults { present, tripped: true, ..Faults::default() })
     }
 
     async fn start(&mut self, direction: Direction) -> Result<Status> {

@@ -104,6 +104,9 @@ pub struct Faults {
     pub history: Vec<Fault>,
     /// Alarms that do not trip.
     pub warnings: Vec<Fault>,
+    /// Whether the drive says that it has tripped, by the word that its status goes by: it may name no fault for it, or not yet.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub tripped: bool,
     /// Whether the drive says that a reset would be accepted; `None` where it does not say.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub reset_allowed: Option<bool>,

@@ -124,10 +124,10 @@ pub trait Drivecom: Send {
     /// What stops this drive, from what is known of it: nothing is read.
     fn stop_word(&self, mode: StopMode) -> StopWord;
 
-    /// Reads what the stop word depends on, where that was not known, once a stop is on the wire that does not show or has
-    /// left the drive to somebody else. Whether it has to be written again, with other bits around it.
-    async fn corrects_stop(&mut self) -> bool {
-        false
+    /// Reads what the stop word depends on, where that was not known or may be otherwise by now, once a stop is on the wire that does not
+    /// show or has left the drive to somebody else. The stop that has to be written then: another word, or other bits around the same.
+    async fn corrected_stop(&mut self, _asked: StopMode, _sent: StopWord) -> Option<StopWord> {
+        None
     }
 
     /// Whether the status shows that no run command acts after this stop.
@@ -301,7 +301,7 @@ async fn climb_from<D: Drivecom>(
 /// [`Error::NotConfirmed`] when it does not show within [`CONFIRMED_WITHIN`](drive_core::CONFIRMED_WITHIN), and at once where
 /// the status shows that no word of the bus stops this motor. What the last write ended in, where that was no confirmation.
 pub async fn stop<D: Drivecom>(drive: &mut D, mode: StopMode) -> Result<Stopped> {
-    let stop = drive.stop_word(mode);
+    let mut stop = drive.stop_word(mode);
     let before = drive.last_control().filter(|&control| control != Control::Bus);
     let mut written = write_stop(drive, &stop).await?;
     drive.owes_judgement();
@@ -325,7 +325,8 @@ pub async fn stop<D: Drivecom>(drive: &mut D, mode: StopMode) -> Result<Stopped>
         let elsewhere = status.control.is_some_and(|control| control != Control::Bus);
         if !corrected && (elsewhere || !shown) {
             corrected = true;
-            if drive.corrects_stop().await {
+            if let Some(other) = drive.corrected_stop(mode, stop).await {
+                stop = other;
                 written = write_stop(drive, &stop).await.map_err(Error::after_write)?;
                 continue;
             }

@@ -138,6 +138,8 @@ pub enum EventKind {
     Tripped(Box<Trip>),
     /// What the drive says about its last trip was read.
     TripExplained(Box<Trip>),
+    /// While it is tripped it names another fault than before: the one of this, by which it cannot go on either.
+    FaultChanged(Box<Trip>),
     /// It shows no fault any more.
     FaultCleared,
     /// An alarm that does not trip came or went.
@@ -311,6 +313,7 @@ impl EventKind {
             Self::StateChanged { .. } => "state changed",
             Self::Tripped(_) => "tripped",
             Self::TripExplained(_) => "trip explained",
+            Self::FaultChanged(_) => "fault changed",
             Self::FaultCleared => "fault cleared",
             Self::Warning { .. } => "warning",
             Self::Limit { .. } => "limit",
@@ -394,7 +397,9 @@ impl fmt::Display for EventKind {
             }
             Self::Lost { silent_for, error: None } => write!(f, " for {}", Tenths(*silent_for)),
             Self::StateChanged { from, to } => write!(f, ": {from} to {to}"),
-            Self::Tripped(trip) | Self::TripExplained(trip) => trip_details(f, trip),
+            Self::Tripped(trip) | Self::TripExplained(trip) | Self::FaultChanged(trip) => {
+                trip_details(f, trip)
+            }
             Self::Warning { present } => write!(f, ": {}", if *present { "present" } else { "gone" }),
             Self::Limit { limit, exceeded } => {
                 write!(f, ": {limit}, {}", if *exceeded { "exceeded" } else { "kept again" })

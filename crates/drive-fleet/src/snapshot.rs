@@ -234,7 +234,8 @@ pub struct Trip {
     pub before: Option<Timed<Status>>,
     /// The first status that shows it.
     pub status: Timed<Status>,
-    /// What the drive said about its faults, as soon as that has been read.
+    /// What the drive said last about its faults, as soon as that has been read: while it is tripped it is asked again, for another fault may
+    /// come in the place of the first.
     pub faults: Option<Arc<Faults>>,
     /// Whether it tripped by its communication watchdog: its own code says so. Where its manual names none for that it is not known.
     pub by_watchdog: bool,

@@ -325,6 +325,9 @@ pub enum Happened {
     TripExplained {
         fault: Box<TripView>,
     },
+    FaultChanged {
+        fault: Box<TripView>,
+    },
     FaultCleared,
     Warning {
         present: bool,
@@ -491,6 +494,7 @@ impl From<&EventKind> for Happened {
             EventKind::StateChanged { from, to } => Self::StateChanged { from: *from, to: *to },
             EventKind::Tripped(told) => Self::Tripped { fault: trip(told) },
             EventKind::TripExplained(told) => Self::TripExplained { fault: trip(told) },
+            EventKind::FaultChanged(told) => Self::FaultChanged { fault: trip(told) },
             EventKind::FaultCleared => Self::FaultCleared,
             EventKind::Warning { present } => Self::Warning { present: *present },
             EventKind::Limit { limit, exceeded } => Self::Limit { limit: *limit, exceeded: *exceeded },

@@ -148,7 +148,8 @@ fn of_target<'a>(state: &'a StateView, target: &'a Target) -> impl Iterator<Item
 /// The present faults and the history of one drive.
 pub fn faults(drive: &str, faults: &Faults) -> Result<(), Failure> {
     if faults.present.is_empty() {
-        output::say(format_args!("{drive} has no fault"))?;
+        let what = if faults.tripped { "has tripped, and names no fault" } else { "has no fault" };
+        output::say(format_args!("{drive} {what}"))?;
     }
     let present = faults.present.iter().map(|fault| (format!("{drive} has tripped, fault"), fault));
     let warnings = faults.warnings.iter().map(|fault| ("  warning".to_owned(), fault));
@@ -159,7 +160,7 @@ pub fn faults(drive: &str, faults: &Faults) -> Result<(), Failure> {
         }
     }
     match faults.reset_allowed {
-        Some(true) if !faults.present.is_empty() => {
+        Some(true) if faults.tripped => {
             output::say("  the drive would accept a reset now: drived reset")?;
         }
         Some(false) => output::say("  the drive would not accept a reset now: its cause is still there")?,

@@ -3,11 +3,11 @@
 use std::{fmt, time::Duration};
 
 use drive_bus::{Endpoint, Line, LineConfig};
-use drive_core::{Error, ErrorKind, Frequency, Motion, PortError, Status, StopMode};
+use drive_core::{CONFIRMED_WITHIN, Error, ErrorKind, Frequency, Motion, PortError, Status, StopMode};
 use drive_families::Options;
 use drive_fleet::{
     DriveHandle, DriveSettings, Event, EventKind, Events, Fleet, LastSeen, Link, Outcome, PendingStop,
-    Periods, Received, Refused, Started, StopModes, StopOrder, Timed, Times, Unknown,
+    Periods, Received, Refused, Snapshot, Started, StopModes, StopOrder, Timed, Times, Unknown,
 };
 use tokio::time::{Instant, MissedTickBehavior, interval_at, timeout};
 
@@ -157,6 +157,15 @@ impl Commanded {
     pub fn status(&self) -> Status {
         let snapshot = self.handle.snapshot();
         snapshot.status.as_ref().map(|status| Status::clone(&status.value)).unwrap_or_default()
+    }
+
+    /// What it shows behind a command that is confirmed now: what it showed before says nothing of that. Where it says nothing more in time
+    /// the last is all there is.
+    pub async fn status_behind(&self) -> Status {
+        let now = Instant::now();
+        let is_younger = |snapshot: &Snapshot| snapshot.status.as_ref().is_some_and(|status| status.at > now);
+        timeout(CONFIRMED_WITHIN, self.handle.wait_until(is_younger)).await.ok();
+        self.status()
     }
 
     /// Waits until the drive has answered, and then for what becomes of a command.

@@ -118,7 +118,7 @@ impl OneDriveArgs {
         if !outcome.is_confirmed() {
             return Err(one.failure(&outcome));
         }
-        self.say_done(&one, order.command().action(), &one.status(), done)?;
+        self.say_done(&one, order.command().action(), &one.status_behind().await, done)?;
         one.close().await;
         Ok(())
     }

@@ -100,7 +100,9 @@ impl Supervisor {
         }
         self.doubtful = false;
         self.compare(before.as_ref().map(|before| &*before.value), &status.value, found);
-        if status.value.is_fault() && !before.as_ref().is_some_and(|before| before.value.is_fault()) {
+        if status.value.is_fault() && before.as_ref().is_some_and(|before| before.value.is_fault()) {
+            self.see_another_fault(&status.value);
+        } else if status.value.is_fault() {
             let armed_for = self.checks.armed_for().filter(|_| before.is_some());
             let unheard = armed_for.filter(|timeout| silent_for >= *timeout).map(|_| silent_for);
             // Where no code is shown yet, its explanation will tell; where the manual names none for it, as that of an Altivar 58, how
@@ -270,6 +272,14 @@ impl Supervisor {
         }
     }
 
+    /// Another fault may stand where the one of the trip stood: where the status names another, the drive is asked anew.
+    fn see_another_fault(&mut self, status: &Status) {
+        let told = self.trips.back().and_then(Trip::fault).map(|fault| fault.code);
+        if told.zip(status.fault_code).is_some_and(|(told, shown)| told != shown) {
+            self.explanations = EXPLANATIONS;
+        }
+    }
+
     fn reset_watchdog_trip(&mut self, now: Instant) {
         if self.settings.control && self.settings.on_fault == OnFault::ResetWatchdogTrip {
             self.enqueue_reset(now);
@@ -284,10 +294,23 @@ impl Supervisor {
         self.explanations = 0;
         let trips = Arc::make_mut(&mut self.trips);
         let Some(trip) = trips.back_mut() else { return };
+        if let Some(before) = &trip.faults {
+            // One that is gone was reset meanwhile.
+            if before.present != faults.present && !faults.present.is_empty() {
+                // Another may have come on top of the first, so that no policy resets it, whatever it is.
+                (trip.by_watchdog, trip.watchdog_after) = (false, None);
+                trip.faults = Some(Arc::new(faults));
+                // As it was found is said of the trip.
+                let changed = Box::new(Trip { found: false, ..trip.clone() });
+                self.queue.retain(|queued| !matches!(queued.asker, Asker::Policy(Policy::OnFault)));
+                self.emit_by(EventKind::FaultChanged(changed), Cause::Drive);
+            }
+            return;
+        }
         let code = self.communication_fault.filter(|_| trip.status.value.fault_code.is_none());
         let by_watchdog = code.is_some_and(|code| faults.present.iter().any(|fault| fault.code == code));
-        trip.faults = Some(Arc::new(faults));
         trip.by_watchdog |= by_watchdog;
+        trip.faults = Some(Arc::new(faults));
         if self.communication_fault.is_some() && !trip.by_watchdog {
             trip.watchdog_after = None;
         }
@@ -307,6 +330,10 @@ impl Supervisor {
         self.retraction.measurements(now);
         self.measurements = Some(Timed::<Measurements>::new(measurements, now));
         self.check_limits();
+        if self.status.as_ref().is_some_and(|status| status.value.is_fault()) {
+            // What stands now may be another fault than the one of its trip.
+            self.explanations = self.explanations.max(1);
+        }
         self.changed = true;
     }
 

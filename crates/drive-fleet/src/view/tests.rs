@@ -321,7 +321,8 @@ fn every_kind() -> Vec<EventKind> {
         EventKind::Lost { silent_for: Duration::from_secs(3), error: None },
         EventKind::StateChanged { from: State::Ready, to: State::Running },
         EventKind::Tripped(trip.clone()),
-        EventKind::TripExplained(trip),
+        EventKind::TripExplained(trip.clone()),
+        EventKind::FaultChanged(trip),
         EventKind::FaultCleared,
         EventKind::Warning { present: true },
         EventKind::Limit {

@@ -339,7 +339,8 @@ impl<P: Port> ProfileDrive<P> {
         let (status, _) = self.read_status(Class::Background).await?;
         let table = self.profile.fault_entries();
         let present = status.fault_code.map(|code| Fault::lookup(table, code));
-        Ok(Faults { present: present.into_iter().collect(), ..Faults::default() })
+        let tripped = status.is_fault();
+        Ok(Faults { present: present.into_iter().collect(), tripped, ..Faults::default() })
     }
 }
 

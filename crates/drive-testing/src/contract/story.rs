@@ -38,7 +38,8 @@ async fn nothing_moves_at_first(rig: &mut Rig) {
     // Of a motor that was not seen before, not every drive tells whether it coasts.
     assert!(status.is_undriven(), "{status}");
     rig.drive.measurements().await.expect("it measures");
-    assert_eq!(rig.drive.faults().await.expect("it tells its faults").present, []);
+    let faults = rig.drive.faults().await.expect("it tells its faults");
+    assert_eq!((faults.tripped, faults.present), (false, vec![]));
     assert!(!rig.machine.observe().running, "reading moves nothing");
 }
 
@@ -96,7 +97,7 @@ async fn it_trips_says_why_and_stays_still_after_the_reset(rig: &mut Rig, trip: 
 
     let faults = rig.drive.faults().await.expect("it tells its faults");
     let present: Vec<u16> = faults.present.iter().map(|fault| fault.code).collect();
-    assert_eq!(present, [trip]);
+    assert_eq!((faults.tripped, &present[..]), (true, &[trip][..]));
 
     let refused = rig.drive.start(Direction::Forward).await.expect_err("it has tripped");
     assert!(

@@ -25,7 +25,7 @@ const ALSO: usize = 8;
 /// What is told of one reading is recorded within this time.
 const ONE_READING_MS: i64 = 150;
 /// What a story is about, the weightiest first. `run`: a motor began or ceased to run.
-const WEIGHT: [&str; 28] = [
+const WEIGHT: [&str; 29] = [
     "tripped",
     "stop_unconfirmed",
     "other_family",
@@ -38,6 +38,7 @@ const WEIGHT: [&str; 28] = [
     "control_taken",
     "watchdog_not_in_force",
     "lost",
+    "fault_changed",
     "fault_cleared",
     "run",
     "output_departed",
@@ -56,7 +57,7 @@ const WEIGHT: [&str; 28] = [
     "control_returned",
 ];
 /// What is heavier than anything that a person does.
-const HEAVY: usize = 12;
+const HEAVY: usize = 13;
 
 /// What is asked for: a moment, or the minute that begins with it.
 #[derive(Debug, Clone, Copy)]

@@ -114,6 +114,7 @@ impl<P: Port> Fan1<P> {
         let status = self.read_status(Class::Background).await?;
         let code = status.raw(at::FAULT).filter(|_| status.is_fault());
         Ok(Faults {
+            tripped: status.is_fault(),
             present: code.map(|code| Fault::lookup(FAULTS, code)).into_iter().collect(),
             ..Faults::default()
         })

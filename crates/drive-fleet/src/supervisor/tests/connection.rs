@@ -155,6 +155,32 @@ fn a_trip_without_a_lost_line_is_not_the_watchdogs() {
     assert!(rig.events().contains(&"trip explained"));
 }
 
+/// An Altivar's LFt names the last fault, whichever that was when the trip was seen first; its status need not show it.
+#[test]
+fn a_fault_that_comes_in_the_place_of_another_is_told_and_explained_and_no_policy_resets_it() {
+    for (is_shown, second) in [(true, 9), (true, 18), (false, 9), (false, 18)] {
+        let mut rig = Rig::ready();
+        rig.machine.settings.on_fault = OnFault::ResetWatchdogTrip;
+        let trip = |rig: &mut Rig, code| {
+            rig.drive.trip(code);
+            rig.drive.status.fault_code = is_shown.then_some(code);
+            rig.drive.names_fault = Some(code);
+        };
+        trip(&mut rig, 4);
+        rig.pass(10_000 * MS);
+        trip(&mut rig, second);
+        rig.pass(30_000 * MS);
+        let snapshot = rig.snapshot();
+        let told = snapshot.trips.back().and_then(Trip::fault).map(|fault| fault.code);
+        assert_eq!(told, Some(second), "{is_shown}");
+        let events = rig.events();
+        let told = |name| events.iter().filter(|event| **event == name).count();
+        assert_eq!((told("tripped"), told("trip explained"), told("fault changed")), (1, 1, 1), "{events:?}");
+        assert!(!rig.drive.log.contains(&Job::ResetFaults), "{second}, {is_shown}");
+        assert_eq!(snapshot.counters.trips, 1);
+    }
+}
+
 #[test]
 fn the_last_trips_are_kept_and_their_number_is_bounded() {
     let mut rig = Rig::ready();

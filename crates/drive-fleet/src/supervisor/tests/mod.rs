@@ -17,9 +17,9 @@ mod withdrawn;
 use std::time::Duration;
 
 use drive_core::{
-    Command, Control, Direction, ExceptionMeaning, Exchange, Frequency, Identity, Lack, Lease, Measurements,
-    Motion, PortError, Reaction, Recognised, Refusal, Result, SelfRestart, SlaveAddress, State, StopMode,
-    Stopped, Verdict, Watchdog, Withdrawn, Written, registers::Storage,
+    Command, Control, Direction, ExceptionMeaning, Exchange, Fault, Frequency, Identity, Lack, Lease,
+    Measurements, Motion, PortError, Reaction, Recognised, Refusal, Result, SelfRestart, SlaveAddress, State,
+    StopMode, Stopped, Verdict, Watchdog, Withdrawn, Written, registers::Storage,
 };
 
 use super::*;
@@ -52,6 +52,8 @@ struct Paper {
     refuses: Option<(u8, ExceptionMeaning)>,
     /// A command is carried out and its answer is lost, once.
     loses_answer: bool,
+    /// The fault that it names when it is asked, of one whose status names none.
+    names_fault: Option<u16>,
     /// What a run command does; `false`: nothing.
     obeys: bool,
     /// By which mode it stops whatever it is told, and why.
@@ -126,6 +128,7 @@ impl Paper {
             failing: None,
             refuses: None,
             loses_answer: false,
+            names_fault: None,
             obeys: true,
             stops_by: None,
             withdraws: true,
@@ -360,7 +363,11 @@ impl Paper {
             Job::Ask(Question::Faults) => {
                 Reply::Told(self.result(Told::Faults(drive_core::Faults::default())))
             }
-            Job::Faults => Reply::Faults(self.result(drive_core::Faults::default())),
+            Job::Faults => {
+                let code = self.names_fault.or(self.status.fault_code).filter(|_| self.status.is_fault());
+                let present = code.map(|code| Fault { code, entry: None }).into_iter().collect();
+                Reply::Faults(self.result(drive_core::Faults { present, ..drive_core::Faults::default() }))
+            }
             Job::Measurements => {
                 let measurements = Measurements { reference: self.reference, ..Measurements::default() };
                 Reply::Measurements(self.result(measurements))

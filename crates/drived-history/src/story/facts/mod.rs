@@ -67,11 +67,12 @@ pub(super) struct Facts {
 /// What a drive shows when it is seen again is told of it within this time.
 pub(super) const SEEN_AGAIN_MS: i64 = 3_000;
 /// Events that tell what was read of a drive at their moment. Behind a kill they are there, and the values of the last minute are not.
-const SHOWN: [&str; 10] = [
+const SHOWN: [&str; 11] = [
     "connected",
     "identified",
     "state_changed",
     "tripped",
+    "fault_changed",
     "fault_cleared",
     "control_taken",
     "control_returned",

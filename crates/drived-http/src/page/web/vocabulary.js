@@ -101,6 +101,7 @@ const WORDS = {
   // Kinds of events.
   tripped: ['Tripped', 'Défaut'],
   trip_explained: ['Trip explained', 'Défaut expliqué'],
+  fault_changed: ['Another fault', 'Autre défaut'],
   fault_cleared: ['Fault cleared', 'Défaut effacé'],
   state_changed: ['State', 'État'],
   warning: ['Alarm of the drive', 'Alarme du variateur'],

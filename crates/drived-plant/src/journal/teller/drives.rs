@@ -108,6 +108,11 @@ impl Teller {
         }
     }
 
+    pub(super) fn fault_changed(&mut self, now: Instant, drive: &Arc<str>, trip: &Trip) {
+        let Some(present) = trip.faults.as_ref().and_then(|faults| faults.present.first()) else { return };
+        self.say(now, drive, Level::WARN, "fault", format!("another fault stands now: {}", fault(present)));
+    }
+
     pub(super) fn commanded(
         &mut self,
         now: Instant,

@@ -172,6 +172,7 @@ impl Teller {
             }
             EventKind::Tripped(trip) => self.tripped(now, drive, trip),
             EventKind::TripExplained(trip) => self.explained(now, drive, trip),
+            EventKind::FaultChanged(trip) => self.fault_changed(now, drive, trip),
             EventKind::FaultCleared => {
                 let state = self.state(drive);
                 let is_news = std::mem::take(&mut state.tripped);

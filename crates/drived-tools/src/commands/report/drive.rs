@@ -245,10 +245,11 @@ fn faults(drive: &DriveTold) -> Markup {
     let kept = drive.family.as_ref().map_or(0, |family| family.capabilities().fault_history);
     html! {
         @for fault in &trips { (present(*fault, by_watchdog)) }
-        @if trips.is_empty() { p { (own("No fault is present.")) } }
+        @if trips.is_empty() && faults.tripped { p { (own("It has tripped, and names no fault.")) } }
+        @if trips.is_empty() && !faults.tripped { p { (own("No fault is present.")) } }
         @if let Some(trip) = trip { p { (own("The program saw it at ")) (moment(trip.time_unix_ms)) "." } }
         @match faults.reset_allowed {
-            Some(true) if !faults.present.is_empty() => p { (own("The drive would accept a reset.")) },
+            Some(true) if faults.tripped => p { (own("The drive would accept a reset.")) },
             Some(false) => p { (own("The drive would not accept a reset: its cause is still there.")) },
             _ => {},
         }

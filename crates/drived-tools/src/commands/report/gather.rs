@@ -122,7 +122,7 @@ impl DriveTold {
     /// Reads the faults of a drive again that has tripped, or was reset, since they were read.
     async fn ask_again(&mut self, daemon: &mut Daemon) {
         let is_tripped = self.view.snapshot.fault.is_some();
-        let is_known = self.faults.as_ref().is_ok_and(|faults| faults.present.is_empty() != is_tripped);
+        let is_known = self.faults.as_ref().is_ok_and(|faults| faults.tripped == is_tripped);
         if self.is_there() && !is_known {
             let name = self.view.name();
             self.faults = ask(daemon, &["drives", name, "faults"]).await;

@@ -348,6 +348,7 @@ pub(super) const WORDS: &[(&str, &str)] = &[
     ("not read: ", "non lu : "),
     ("not told by this family", "non communiqué par cette famille"),
     ("None.", "Aucun."),
+    ("It has tripped, and names no fault.", "Il est en défaut et n’en nomme aucun."),
     ("No fault is present.", "Aucun défaut présent."),
     ("The history of the drive is empty.", "L’historique du variateur est vide."),
     ("This family keeps no history of faults.", "Cette famille ne garde pas d’historique des défauts."),
