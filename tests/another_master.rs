@@ -10,7 +10,7 @@ use drive_sim::{SimLine, SimSlave, Wiring, models};
 use futures_util::FutureExt as _;
 use support::drives::{Five, five};
 
-use Intent::{Prepare, ResetFaults, Setpoint, Start, Stop};
+use Intent::{Prepare, QuickStop, ResetFaults, Setpoint, Start, Stop};
 use StopMode::{DcInjection, Fast, Freewheel, Ramp};
 
 fn drive(family: Family) -> (SimSlave, Box<dyn Drive>) {
@@ -38,7 +38,7 @@ fn hertz(centihertz: u32) -> Intent {
 async fn command_words_are_understood_as_the_manuals_have_them_and_none_needs_an_exchange() {
     let chart = [
         (0x0000, Some(Stop(Freewheel))),
-        (0x0002, Some(Stop(Fast))),
+        (0x0002, Some(QuickStop)),
         (0x0006, Some(Prepare(Freewheel))),
         (0x0007, Some(Prepare(Ramp))),
         (0x000F, Some(Start(Forward))),

@@ -343,15 +343,16 @@ impl<P: Port> Atv21<P> {
     }
 
     /// The word that stops in this mode and leaves to others what is theirs: motor, PID control, ramp and the priorities
-    /// stay as the drive holds them. A drive that was never read is commanded by the bus from then on.
+    /// stay as the drive holds them. A drive that was never read is commanded by the bus from then on; its reference is nothing that a
+    /// stop needs, and the priority of the bus's would override the plant's own switch of it (§6.2 p. 16).
     pub(crate) fn stop_word(&self, mode: StopMode) -> CommandWord {
         let order = match mode {
             StopMode::Ramp | StopMode::Fast => CommandWord::empty(),
             StopMode::Freewheel => CommandWord::FREEWHEEL,
             StopMode::DcInjection => CommandWord::DC_BRAKING,
         };
-        let kept = self.held.map_or(CommandWord::PRIORITIES, |held| held & CommandWord::KEPT);
-        self.priorities() | kept | order
+        let kept = self.held.map_or(CommandWord::COMMAND_PRIORITY, |held| held & CommandWord::KEPT);
+        (self.priorities() & CommandWord::COMMAND_PRIORITY) | kept | order
     }
 
     /// The run command in this direction, with what its owner has chosen, or else as the drive holds it.

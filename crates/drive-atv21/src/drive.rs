@@ -85,7 +85,7 @@ impl<P: Port> Drive for Atv21<P> {
         self.judge_start(direction).await.map(drop)
     }
 
-    /// Writes FA00 at once, with bits 4 to 6, 14 and 15 as the drive held them last; of a drive that was never read C000h
+    /// Writes FA00 at once, with bits 4 to 6, 14 and 15 as the drive held them last; of a drive that was never read 8000h
     /// with the mode's bit. A fast stop is one by ramp. It is confirmed when FA00 reads back and FD01 does not run, or the
     /// output goes down, the bus commands and no input forces anything (F110 to F113, F118). Where somebody else runs the
     /// motor and the command priority is not set, it is set.
@@ -180,7 +180,7 @@ impl<P: Port> Drive for Atv21<P> {
             StopMode::DcInjection => CommandWord::DC_BRAKING,
             StopMode::Fast => return None,
         };
-        let value = (CommandWord::PRIORITIES | order).bits();
+        let value = (CommandWord::COMMAND_PRIORITY | order).bits();
         Some(BroadcastWrite { function: 0x06, register: registers::COMMAND_WORD.address(), value })
     }
 }

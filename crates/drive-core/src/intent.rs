@@ -13,6 +13,9 @@ pub enum Intent {
     Start(Direction),
     /// No run: a motor that runs stops so.
     Stop(StopMode),
+    /// A quick stop of the state chart: no run, and none is taken behind it before the voltage was disabled, by a
+    /// [`Stop`](Self::Stop) that is a freewheel.
+    QuickStop,
     /// A step on the way to a run command, which moves nothing; a motor that runs stops so.
     Prepare(StopMode),
     /// Reset the present fault; where there is none, a motor that runs stops so.
@@ -27,6 +30,7 @@ impl Intent {
     pub const fn stops(self) -> Option<StopMode> {
         match self {
             Self::Stop(mode) | Self::Prepare(mode) | Self::ResetFaults(mode) => Some(mode),
+            Self::QuickStop => Some(StopMode::Fast),
             Self::Start(_) | Self::Setpoint(_) => None,
         }
     }

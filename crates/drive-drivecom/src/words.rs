@@ -100,7 +100,7 @@ impl ControlWord {
         } else if !self.contains(Self::ENABLE_VOLTAGE) {
             Intent::Stop(StopMode::Freewheel)
         } else if !self.contains(Self::NO_QUICK_STOP) {
-            Intent::Stop(StopMode::Fast)
+            Intent::QuickStop
         } else if !self.contains(Self::SWITCH_ON) {
             Intent::Prepare(StopMode::Freewheel)
         } else if !enabled {

@@ -52,14 +52,14 @@ async fn run_by_terminals(rig: &Rig) {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_drive_that_was_never_read_is_stopped_by_c000h_at_once_and_read_as_a_command() {
+async fn a_drive_that_was_never_read_is_stopped_by_8000h_at_once_and_read_as_a_command() {
     for authority in [Authority::Priority, Authority::Settings] {
         let mut words = words(&[]);
         words.words.insert(0xFD01, 0x4000);
         let mut drive = driver(words).with_authority(authority);
         drive.stop(StopMode::Ramp).await.unwrap();
         let asked = drive.into_port().asked;
-        assert_eq!(asked[0], Asked::Write(Class::Stop, 0xFA00, vec![0xC000]));
+        assert_eq!(asked[0], Asked::Write(Class::Stop, 0xFA00, vec![0x8000]));
         assert!(asked[1..].iter().all(|asked| matches!(asked, Asked::Read(Class::Command, ..))), "{asked:?}");
     }
 }
@@ -70,7 +70,7 @@ async fn a_stop_leaves_motor_ramp_and_priorities_as_the_drive_holds_them() {
         (Authority::Settings, 0xC450, 0xC050),
         (Authority::Settings, 0x0470, 0x0070),
         (Authority::Priority, 0xC650, 0xC050),
-        (Authority::Priority, 0x0407, 0xC000),
+        (Authority::Priority, 0x0407, 0x8000),
     ] {
         let mut drive = driver(words(&[(0xFA00, held), (0xFD00, 0)])).with_authority(authority);
         drive.status().await.unwrap();

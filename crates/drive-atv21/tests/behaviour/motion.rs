@@ -228,6 +228,20 @@ async fn a_lost_confirmation_of_a_stop_is_read_back() {
     rig.line.close().await;
 }
 
+/// F207 and F112 = 38 (FCHG) of the Modbus guide's example (§6.2 p. 16): an input of the plant chooses the reference, which bit 14 would
+/// override (§8.4).
+#[tokio::test(start_paused = true)]
+async fn a_stop_leaves_whose_the_reference_is_to_the_plants_own_switch() {
+    let words = Words::new(&CAPABILITIES, &[(0xFD01, 0x4000), (0xFE45, 2), (0xFE46, 1)]);
+    let mut drive = Atv21::new(words, bench::address(1));
+    drive.stop(StopMode::Ramp).await.unwrap();
+    let written = drive.into_port().written();
+    assert!(
+        written.iter().all(|(register, word)| *register == 0xFA00 && word & 0x4000 == 0),
+        "{written:04X?}"
+    );
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_stop_that_a_late_start_overtakes_is_written_again_at_once() {
     let (rig, mut drive) = Rig::factory();
@@ -239,7 +253,7 @@ async fn a_stop_that_a_late_start_overtakes_is_written_again_at_once() {
         rig.machine.release();
     });
     assert_ne!(status.unwrap().status.state, State::Running);
-    assert_eq!((rig.machine.peek(0xFA00), bench::written(&rig.machine, 0xFA00).len()), (Some(0xC000), 2));
+    assert_eq!((rig.machine.peek(0xFA00), bench::written(&rig.machine, 0xFA00).len()), (Some(0x8000), 2));
 }
 
 #[tokio::test(start_paused = true)]
@@ -250,7 +264,7 @@ async fn a_stop_that_is_revoked_again_and_again_is_not_confirmed() {
     assert_eq!(drive.stop(StopMode::Ramp).await.unwrap_err().kind(), ErrorKind::NotConfirmed);
     let written = drive.into_port().written();
     assert!((5..40).contains(&written.len()), "{written:?}");
-    assert!(written.iter().all(|write| *write == (0xFA00, 0xC000)), "{written:?}");
+    assert!(written.iter().all(|write| *write == (0xFA00, 0x8000)), "{written:?}");
 }
 
 #[tokio::test(start_paused = true)]
@@ -260,8 +274,8 @@ async fn an_emergency_stop_whose_clearing_was_lost_is_cleared_before_it_counts_a
     let mut drive = Atv21::new(words, bench::address(1));
     assert!(drive.emergency_stop().await.unwrap().is_fault());
     let port = drive.into_port();
-    assert_eq!(port.written(), [(0xFA00, 0xD000), (0xFA00, 0xC000), (0xFA00, 0xC000)]);
-    assert_eq!(port.words.get(&0xFA00), Some(&0xC000));
+    assert_eq!(port.written(), [(0xFA00, 0x9000), (0xFA00, 0x8000), (0xFA00, 0x8000)]);
+    assert_eq!(port.words.get(&0xFA00), Some(&0x8000));
 }
 
 #[tokio::test(start_paused = true)]

@@ -270,7 +270,7 @@ fn the_models_are_those_of_8_9() {
 fn every_stop_word_is_one_that_8_4_allows() {
     let drive = Atv21::new(Words::new(&CAPABILITIES, &[]), bench::address(1));
     let words = StopMode::ALL.map(|mode| drive.broadcast_stop(mode).map(|write| write.value));
-    assert_eq!(words, [Some(0xC000), None, Some(0xC800), Some(0xC080)]);
+    assert_eq!(words, [Some(0x8000), None, Some(0x8800), Some(0x8080)]);
     // 0000h would give every drive of the line to its terminals.
     let drive = drive.with_authority(Authority::Settings);
     assert_eq!(words, StopMode::ALL.map(|mode| drive.broadcast_stop(mode).map(|write| write.value)));

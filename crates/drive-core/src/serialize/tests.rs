@@ -58,7 +58,7 @@ fn what_a_drive_does_not_tell_has_no_key() {
     is(Status::default(), json!({"state": "unknown", "raw": []}));
     is(Measurements::default(), json!({"before_trip": false, "raw": []}));
     is(Identity::default(), json!({"codes": []}));
-    is(Faults::default(), json!({"present": [], "history": [], "warnings": []}));
+    is(Faults::default(), json!({"present": [], "history": [], "warnings": [], "tripped": false}));
 }
 
 #[test]
@@ -108,6 +108,7 @@ fn a_fault_is_told_with_what_to_do_and_one_that_no_manual_lists_by_its_code() {
     let faults = Faults {
         present: vec![Fault::lookup(&TABLE, 9)],
         history: vec![Fault::lookup(&TABLE, 77)],
+        tripped: true,
         reset_allowed: Some(true),
         ..Faults::default()
     };
@@ -115,7 +116,7 @@ fn a_fault_is_told_with_what_to_do_and_one_that_no_manual_lists_by_its_code() {
         faults,
         json!({
             "present": [{"code": 9, "mnemonic": "OLF", "meaning": "motor overload", "remedy": "let the motor cool"}],
-            "history": [{"code": 77}], "warnings": [], "reset_allowed": true
+            "history": [{"code": 77}], "warnings": [], "tripped": true, "reset_allowed": true
         }),
     );
 }

@@ -47,9 +47,9 @@ struct Wanted {
     setpoint: Option<Setpoint>,
 }
 
-/// A stop that waits for nothing.
+/// A stop that waits for nothing: by what its word asks, which stops a motor by this mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Stop(StopMode);
+pub(crate) struct Stop(Intent, StopMode);
 
 impl Desk {
     /// Whether a write stops the motor, so that it goes ahead of what waits: a word that is a stop; or one without a run
@@ -61,12 +61,11 @@ impl Desk {
         }
         let drive = self.drive(unit).filter(|_| self.config.rights.stop)?;
         let stop = self.intents_without_reading(&drive, ask).find_map(|intent| match intent {
-            Intent::Stop(mode) => Some(mode),
-            Intent::Prepare(mode) if !stands(&drive) => Some(mode),
-            Intent::ResetFaults(mode) if !stands(&drive) && !shows_fault(&drive) => Some(mode),
-            _ => None,
+            Intent::Prepare(_) if stands(&drive) => None,
+            Intent::ResetFaults(_) if stands(&drive) || shows_fault(&drive) => None,
+            intent => intent.stops().map(|mode| Stop(intent, mode)),
         });
-        stop.map(Stop)
+        stop
     }
 
     /// To whom a write to a unit goes.
@@ -97,8 +96,8 @@ impl Desk {
         drives.iter().for_each(|drive| self.kept.forget(drive.place()));
         let written = match (stop, &drives[..]) {
             (Some(stop), [drive]) => {
-                self.clients.write(peer, drive.place(), Word::WithoutRun);
-                let stopped = self.stop(&caller, drive, stop.0, arrived).await;
+                self.clients.write(peer, drive.place(), Word::of(stop.0));
+                let stopped = self.stop(&caller, drive, stop.1, arrived).await;
                 match stopped {
                     Ok(()) => self.setpoint_beside(&caller, drive, ask, arrived).await,
                     refused => refused,
@@ -106,8 +105,8 @@ impl Desk {
             }
             (Some(stop), drives) => {
                 let stops = drives.iter().map(|drive| {
-                    self.clients.write(peer, drive.place(), Word::WithoutRun);
-                    self.stop(&caller, drive, stop.0, arrived)
+                    self.clients.write(peer, drive.place(), Word::of(stop.0));
+                    self.stop(&caller, drive, stop.1, arrived)
                 });
                 join_all(stops).await.into_iter().collect()
             }
@@ -156,7 +155,7 @@ impl Desk {
         };
         let drives: Vec<_> = self.drives().into_iter().filter(is_built_in).collect();
         let intents = drives.iter().flat_map(|drive| self.intents_without_reading(drive, ask));
-        stop_of_all(intents).map(Stop)
+        stop_of_all(intents)
     }
 
     /// Stops a motor. Confirmed when the drive shows that no run command is in force any more; it may still come down.
@@ -283,11 +282,11 @@ impl Desk {
                 self.start(peer, caller, drive, (direction, setpoint), action, (arrived, deadline)).await
             }
             Some(Intent::ResetFaults(_)) if shows_fault(drive) => {
-                self.clients.write(peer, drive.place(), Word::WithoutRun);
+                self.clients.write(peer, drive.place(), Word::NoVoltage);
                 self.order(caller, drive, Action::Reset, arrived, deadline).await
             }
             Some(step) => {
-                self.clients.write(peer, drive.place(), Word::WithoutRun);
+                self.clients.write(peer, drive.place(), Word::of(step));
                 match step.stops().filter(|_| !stands(drive)) {
                     // It was started while this waited.
                     Some(mode) => self.stop(caller, drive, mode, arrived).await?,
@@ -332,7 +331,12 @@ impl Desk {
         // What was wished before a stop of somebody else is not wished behind it.
         let asked_after = match before {
             _ if runs => arrived,
-            Some((Word::WithoutRun, at)) => at,
+            Some((Word::WithoutRun | Word::NoVoltage, at)) => at,
+            Some((Word::QuickStop, _)) => {
+                return Err(Refusal::rule(
+                    "behind a quick stop a drive is locked until its voltage was disabled: write 0000h first",
+                ));
+            }
             _ => {
                 return Err(Refusal::rule(
                     "nothing starts by a run command that only goes on: write one without run first",
@@ -545,12 +549,12 @@ fn shows_fault(drive: &DriveHandle) -> bool {
 
 /// How the words stop all, if they do, by what they ask of each drive that understands them: whoever speaks of one family to all means
 /// all of them, so that they do when they stop any and start none. The mode is that of the first.
-fn stop_of_all(intents: impl Iterator<Item = Intent>) -> Option<StopMode> {
+fn stop_of_all(intents: impl Iterator<Item = Intent>) -> Option<Stop> {
     let mut first = None;
     for intent in intents {
         match intent {
             Intent::Start(_) => return None,
-            other => first = first.or(other.stops()),
+            other => first = first.or(other.stops().map(|mode| Stop(other, mode))),
         }
     }
     first
@@ -566,7 +570,7 @@ mod tests {
     fn words_for_one_family_stop_every_drive_of_a_gateway_that_none_of_them_starts() {
         let stop = Intent::Stop(StopMode::Freewheel);
         assert_eq!(stop_of_all([].into_iter()), None, "nobody understands it");
-        assert_eq!(stop_of_all([stop, stop].into_iter()), Some(StopMode::Freewheel));
+        assert_eq!(stop_of_all([stop, stop].into_iter()), Some(Stop(stop, StopMode::Freewheel)));
         assert_eq!(stop_of_all([Intent::Start(Direction::Forward), stop].into_iter()), None);
         assert_eq!(stop_of_all([stop, Intent::Start(Direction::Reverse)].into_iter()), None);
     }

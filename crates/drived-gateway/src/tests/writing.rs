@@ -83,6 +83,31 @@ async fn a_scada_that_walks_the_ladder_sees_each_step_and_its_motor_runs_and_sto
     assert!(!plant.machines[0].observe().running);
 }
 
+/// "It is not possible, therefore, to execute a run command immediately after a Quick stop", and it is after a fast stop (BBV51701 p. 11).
+#[tokio::test(start_paused = true)]
+async fn no_run_command_starts_a_motor_behind_a_quick_stop_before_its_voltage_was_disabled() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let mut peer = Peer::of(&desk);
+    climb(&mut peer, 1).await;
+    for stop in [0x0002, 0x400F] {
+        assert_eq!(peer.ask(1, &write_two(CMD, [0x000F, 300])).await[0], 0x10);
+        sleep(Duration::from_secs(10)).await;
+        assert!(plant.machines[0].observe().running);
+        assert_eq!(peer.ask(1, &write(CMD, stop)).await, write(CMD, stop));
+        sleep(Duration::from_secs(10)).await;
+        assert!(!plant.machines[0].observe().running, "{stop:04X}h");
+        if stop == 0x0002 {
+            for word in [0x000F, 0x0006, 0x0007, 0x000F] {
+                let answer = peer.ask(1, &write(CMD, word)).await;
+                assert_eq!(answer[0] == 0x86, word == 0x000F, "{word:04X}h: {answer:02X?}");
+                assert!(!plant.machines[0].observe().running, "{word:04X}h");
+            }
+            climb(&mut peer, 1).await;
+        }
+    }
+    assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+}
+
 #[tokio::test(start_paused = true)]
 async fn setpoint_and_run_command_in_one_write_are_one_order() {
     let (plant, desk) = operated(1, |_| {}).await;
