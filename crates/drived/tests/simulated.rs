@@ -96,6 +96,18 @@ fn a_setpoint_whose_outcome_cannot_be_written_is_told_as_given() {
     assert!(held.assert_done().starts_with("atv312@1 holds the setpoint 20.00 Hz"), "{held:?}");
 }
 
+/// ETA bit 10, "reference reached" (BBV51701 p. 13), is of the setpoint before.
+#[test]
+fn a_setpoint_is_told_with_what_the_drive_shows_behind_it() {
+    let sim = Sim::serve("behind", &["atv312@1"]);
+    sim.on("atv312@1", &["setpoint", "5Hz"]).assert_done();
+    sim.on("atv312@1", &["start"]).assert_done();
+    while !sim.on("atv312@1", &["status"]).assert_done().contains("at reference") {}
+    let told = sim.on("atv312@1", &["setpoint", "45Hz"]);
+    assert!(!told.assert_done().contains("at reference"), "{told:?}");
+    sim.on("atv312@1", &["stop"]).assert_done();
+}
+
 #[test]
 fn a_stop_that_is_given_up_says_that_it_is_not_confirmed() {
     let sim = Sim::serve("given-up", &["atv312@1"]);
