@@ -1,8 +1,9 @@
 //! The engine: a drive of a profile is a [`Drive`](drive_core::Drive) as those are whose families are written by hand.
 
 mod cell;
-mod command;
 mod driven;
+mod ending;
+mod falling;
 mod guards;
 mod owner;
 mod plan;
@@ -10,7 +11,10 @@ mod reading;
 mod setpoint;
 mod settings;
 mod sight;
+mod start;
 mod steady;
+mod step;
+mod stop;
 mod tables;
 mod watchdog;
 

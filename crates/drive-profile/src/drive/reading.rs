@@ -9,7 +9,7 @@ use tokio::time::Instant;
 use super::{
     ProfileDrive, Words,
     cell::Cell,
-    command::has_fallen,
+    falling::has_fallen,
     plan::Block,
     sight::{FullScale, Sight, Test},
 };

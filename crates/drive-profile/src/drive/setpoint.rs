@@ -7,7 +7,7 @@ use drive_core::{
 
 use tokio::time::Instant;
 
-use super::{ProfileDrive, Words, command::has_fallen, reading::OTHERS};
+use super::{ProfileDrive, Words, falling::has_fallen, reading::OTHERS};
 use crate::{
     format::{Access, Register, Setpoint as Fact, Sign, UnitName},
     ladder::Level,

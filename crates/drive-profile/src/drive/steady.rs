@@ -4,7 +4,7 @@
 use drive_core::{Frequency, State};
 use tokio::time::{Duration, Instant};
 
-use super::command::has_fallen;
+use super::falling::has_fallen;
 
 /// How long an output has to go down no more. At a tenth of a hertz a count the slowest ramp of which it is not mistaken takes 1500 s from
 /// 50 Hz.
