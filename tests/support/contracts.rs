@@ -55,8 +55,8 @@ fn control(family: Family) -> (ControlWord, &'static [u16]) {
             ];
             let plausible = &[0x4000, 0x4000, 0x4000, 0x6400, 0x6600, 2, 2, 2, 4, 4, 4, 0, 0, 1, 8_000];
             let others = |written| if written & 0x3508 == 0 { 0xCAF7 } else { 0x0070 };
-            // Words that answer anything seldom name the bus and run in reverse.
-            let unseen = &[0x0600, 0x4600, 0x8600];
+            // Words that answer anything seldom name the bus by CMOD and FMOD alike, or run in reverse.
+            let unseen = &[0x0400, 0x0600, 0x4600, 0x8600];
             (ControlWord { others, unseen, ..control(0xFA00, words) }, plausible)
         }
         Five::Atv28 => {
