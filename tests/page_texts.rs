@@ -53,10 +53,10 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
             }
         }
     }
-    let of_profiles = ["command", "guards", "reading", "setpoint"];
-    for file in of_profiles {
+    let of_profiles = std::fs::read_dir(format!("{root}drive-profile/src/drive")).expect("it is a folder");
+    for file in of_profiles.map(|file| file.expect("it is listed").path()) {
         // What stands over two lines is one sentence.
-        let source = read(&format!("drive-profile/src/drive/{file}.rs"));
+        let source = std::fs::read_to_string(&file).expect("it is read");
         let source = source.replace("\\\n     ", "");
         for before in ["by: \"", "remedy: \"", "Refusal::Settings(", "Refusal::OnlyAStartShows("] {
             sentences.extend(source.split(before).skip(1).filter_map(|rest| {
