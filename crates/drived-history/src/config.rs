@@ -57,7 +57,7 @@ settings! {
     minute_days: u32 = "`90`", |to, said| to.minute_days = within(*said, 1..=3_660, "")?;
     /// how many years those of each hour, events, alarms and commands are kept, 1 to 50
     years: u32 = "`10`", |to, said| to.years = within(*said, 1..=50, "")?;
-    /// how large the file may become, in MiB, 16 to 1048576; what is finest goes first then
+    /// how large the file may become, in MiB, 16 to 1048576; what is finest goes first then, and the oldest words where those take half of it
     size_mib: u32 = "`2048`", |to, said| to.megabytes = within(*said, 16..=1_048_576, "")?;
     /// where every value is sent on to, as lines of Influx: `http://127.0.0.1:8428/write` for VictoriaMetrics, `http://127.0.0.1:8086/write?db=plant` or `…/api/v2/write?org=ORG&bucket=BUCKET` for InfluxDB; what could not be sent follows when that is back
     forward: String = "nowhere", |to, said| to.forward = Some(said.parse().map_err(str::to_owned)?);

@@ -237,6 +237,60 @@ fn what_is_too_much_goes_and_what_is_finest_goes_first() {
 }
 
 #[test]
+fn a_file_that_is_too_large_loses_freeze_frames_with_what_belongs_to_them() {
+    let folder = Folder::new("history-size-frames");
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    for id in 1..=1_000 {
+        store
+            .connection
+            .execute_batch(&format!(
+                "INSERT INTO frame (id, drive, why, at_ms, start_ms, end_ms, is_whole) VALUES ({id}, 'pump', 'tripped', {id}, 0, 1, 1);
+                 INSERT INTO frame_block (frame, quantity, start_ms, end_ms, data) VALUES ({id}, 1, 0, 1, zeroblob(100))"
+            ))
+            .unwrap();
+    }
+    let archive = Archive::begin(moment(0));
+    let tiny = Limits { bytes: 1, ..Limits::default() };
+    while tidy::trim(&mut store.connection, archive.lived(moment(0)), &tiny).unwrap() {}
+    for table in ["frame", "frame_block"] {
+        let left: i64 = store
+            .connection
+            .query_row(&format!("SELECT count(*) FROM {table}"), [], |row| row.get(0))
+            .unwrap();
+        assert_eq!(left, 0, "{table}");
+    }
+}
+
+/// A drive that comes and goes writes words as long as it does so.
+#[test]
+fn words_that_take_half_of_a_file_go_before_its_values_do() {
+    let folder = Folder::new("history-size-words");
+    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
+    let (mut archive, mut pump) = (Archive::begin(moment(0)), Pump::of("pump"));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    for step in 1..20_000_i64 {
+        let now = moment(step * 1_000);
+        pump.read(&mut archive, now, &[(HZ, step % 5_000)]);
+        archive.record(event(now, "pump", "lost"));
+        if archive.is_due(now) {
+            archive.close(now);
+        }
+    }
+    archive.end_run(&mut store.connection, moment(20_000_000)).unwrap();
+    while tidy::compact(&mut store.connection, BEGIN_MS + 30_000_000).unwrap() {}
+    let count = |connection: &Connection, table: &str| -> i64 {
+        connection.query_row(&format!("SELECT count(*) FROM {table}"), [], |row| row.get(0)).unwrap()
+    };
+    let before = ["block", "minute", "record"].map(|table| count(&store.connection, table));
+    let limits = Limits { bytes: tidy::used_bytes(&store.connection).unwrap() * 2 / 3, ..Limits::default() };
+    while tidy::trim(&mut store.connection, archive.lived(moment(20_000_000)), &limits).unwrap() {}
+    let after = ["block", "minute", "record"].map(|table| count(&store.connection, table));
+    assert!(tidy::used_bytes(&store.connection).unwrap() <= limits.bytes);
+    assert_eq!(after[..2], before[..2], "no value goes");
+    assert!(after[2] > 0 && after[2] < before[2], "{after:?} of {before:?}");
+}
+
+#[test]
 fn a_file_of_the_first_version_is_brought_to_this_one_with_all_that_is_in_it() {
     let folder = Folder::new("history-first");
     let path = folder.file("history.sqlite");

@@ -180,8 +180,8 @@ fn short(piece: Piece) -> Vec<Piece> {
     }
 }
 
-/// What belongs to a freeze-frame that is gone.
-const NO_FRAME: &str = "DELETE FROM frame_block WHERE frame NOT IN (SELECT id FROM frame)";
+/// What a record takes beside its words, in bytes, with its places in the indexes.
+const BESIDE_WORDS: i64 = 120;
 /// So many hours of a quantity are packed together, when
 const HOURS_A_PACK: usize = 720;
 /// so many younger ones stand beside them as rows, for the tools of others.
@@ -210,13 +210,17 @@ pub fn trim(connection: &mut Connection, now: Lived, limits: &Limits) -> Result<
         gone += trim_frames(connection, then.frame)?;
     }
     if used_bytes(connection)? > limits.bytes {
-        gone += trim_largest(connection)?;
+        gone += trim_largest(connection, limits)?;
     }
     Ok(gone > 0)
 }
 
 /// What is finest goes first: an hour of ten years ago tells more than a second of yesterday.
-fn trim_largest(connection: &Connection) -> Result<usize, StoreError> {
+fn trim_largest(connection: &Connection, limits: &Limits) -> Result<usize, StoreError> {
+    // Words that take half of the room would leave none for values.
+    if record_bytes(connection)? > limits.bytes / 2 {
+        return trim_table(connection, "record", i64::MAX);
+    }
     let gone = connection.execute(
         &format!(
             "DELETE FROM line_minute WHERE (wall_ms, line) IN
@@ -335,20 +339,37 @@ fn pack_hours(transaction: &Transaction<'_>, source: i64, quantity: Quantity) ->
 
 /// The oldest rows of a table, not younger than this one.
 fn trim_table(connection: &Connection, table: &str, last: i64) -> Result<usize, StoreError> {
-    let at_once = if last == i64::MAX { FEW } else { AT_ONCE };
-    let sql = format!(
-        "DELETE FROM {table} WHERE id IN (SELECT id FROM {table} WHERE id <= ?1 ORDER BY id LIMIT {at_once})"
-    );
+    let sql = format!("DELETE FROM {table} WHERE id IN ({})", oldest(table, last));
     Ok(connection.prepare_cached(&sql)?.execute([last])?)
 }
 
+fn oldest(table: &str, last: i64) -> String {
+    let at_once = if last == i64::MAX { FEW } else { AT_ONCE };
+    format!("SELECT id FROM {table} WHERE id <= ?1 ORDER BY id LIMIT {at_once}")
+}
+
+/// What belongs to a freeze-frame goes before it: the file lets none go that something in it names.
 fn trim_frames(connection: &Connection, last: i64) -> Result<usize, StoreError> {
+    let blocks = format!("DELETE FROM frame_block WHERE frame IN ({})", oldest("frame", last));
+    connection.prepare_cached(&blocks)?.execute([last])?;
     let gone = trim_table(connection, "frame", last)?;
     if gone > 0 {
-        connection.execute(NO_FRAME, [])?;
         captures::trim(connection)?;
     }
     Ok(gone)
+}
+
+/// How much the records take, by how long the youngest are.
+fn record_bytes(connection: &Connection) -> Result<i64, StoreError> {
+    let all: i64 =
+        connection.query_row("SELECT ifnull(max(id) - min(id) + 1, 0) FROM record", [], |row| row.get(0))?;
+    let words: f64 = connection.query_row(
+        "SELECT ifnull(avg(length(text) + ifnull(length(body), 0)), 0) FROM
+            (SELECT text, body FROM record ORDER BY id DESC LIMIT 100)",
+        [],
+        |row| row.get(0),
+    )?;
+    Ok(all.saturating_mul(BESIDE_WORDS + words as i64))
 }
 
 /// How much of the file is in use.
