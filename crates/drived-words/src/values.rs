@@ -174,7 +174,7 @@ pub fn counters(counters: Counters) -> String {
 /// By which fault a drive has tripped; its code alone where nothing more is known.
 pub fn tripped(fault: Option<&Fault>) -> String {
     match fault {
-        None => "by which fault is not read yet".to_owned(),
+        None => "it has named no fault".to_owned(),
         Some(fault) if fault.entry.is_none() => {
             format!("code {}, whose meaning is not known here", fault.code)
         }

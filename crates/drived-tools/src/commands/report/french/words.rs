@@ -47,7 +47,7 @@ pub(super) const WORDS: &[(&str, &str)] = &[
         "the drive has not told it since the program started",
         "le variateur ne l’a pas communiqué depuis le démarrage du programme",
     ),
-    ("by which fault is not read yet", "par quel défaut n’est pas encore lu"),
+    ("it has named no fault", "il n’a nommé aucun défaut"),
     (
         "some are from before the trip, and stand in the drive's words alone",
         "certaines datent d’avant le déclenchement et ne figurent que dans les mots du variateur",
