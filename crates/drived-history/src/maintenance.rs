@@ -3,6 +3,7 @@
 
 use std::{fmt, path::PathBuf, sync::Arc, time::Duration};
 
+use drive_fleet::alarms::{Alarm, AlarmKind};
 use drived_face::Plant;
 use rusqlite::Connection;
 use serde::Deserialize;
@@ -110,8 +111,7 @@ pub(crate) async fn count(
         // A file that cannot be read now has an alarm of its own.
         if let Ok(Ok(counted)) = counted.await {
             counts = counted;
-            tell(&plant, &counts);
-            let due: Vec<Due> = counts.iter().filter_map(Count::due_of).collect();
+            let due = tell(&plant, &counts);
             if let Some(known) = &known {
                 due.iter().filter(|one| !known.contains(one)).for_each(|(drive, part, why)| {
                     inbox.record(became_due(clocks.now(), drive, part, why));
@@ -123,15 +123,22 @@ pub(crate) async fn count(
     }
 }
 
-/// Tells what is due of each drive that has something to be seen to.
-fn tell(plant: &Plant, counts: &[Count]) {
+/// Tells what is due of each drive that has something to be seen to, and gives all of it.
+fn tell(plant: &Plant, counts: &[Count]) -> Vec<Due> {
+    let alarms: Vec<Alarm> = plant.alarms().alarms.into_iter().map(|view| view.alarm).collect();
+    let due_of = |count: &Count| {
+        let (part, why) = count.due().or_else(|| count.stands(&alarms))?;
+        Some((count.maintained.drive.clone(), part, why))
+    };
+    let all: Vec<Due> = counts.iter().filter_map(due_of).collect();
     for drive in plant.fleet().drives() {
-        let mut own = counts.iter().filter(|count| *count.maintained.drive == **drive.name()).peekable();
-        if own.peek().is_some() {
-            let due: Vec<(String, String)> = own.filter_map(Count::due).collect();
-            plant.tell_maintenance(drive.line().0.as_ref(), drive.name(), &due);
+        if counts.iter().any(|count| *count.maintained.drive == **drive.name()) {
+            let own = all.iter().filter(|(of, ..)| **of == **drive.name());
+            let own: Vec<(String, String)> = own.map(|(_, part, why)| (part.clone(), why.clone())).collect();
+            plant.tell_maintenance(drive.line().0.as_ref(), drive.name(), &own);
         }
     }
+    all
 }
 
 /// How far something is.
@@ -144,21 +151,37 @@ struct Count {
     until: i64,
     running_ms: i64,
     starts: u64,
+    /// When it was done last, as far as the file tells,
+    done: Option<i64>,
+    /// and whether that was said since it was counted before.
+    is_just_done: bool,
 }
 
 impl Count {
     const fn new(maintained: Maintained) -> Self {
-        Self { maintained, seen: 0, until: i64::MIN, running_ms: 0, starts: 0 }
+        Self {
+            maintained,
+            seen: 0,
+            until: i64::MIN,
+            running_ms: 0,
+            starts: 0,
+            done: None,
+            is_just_done: false,
+        }
     }
 
     /// Counts what is kept since it was counted last, from when it was done last on.
     fn go_on(&mut self, connection: &Connection) -> Result<(), StoreError> {
         let (Some(first), Some(last)) = bounds(connection)? else { return Ok(()) };
         let newest = connection.query_row("SELECT max(id) FROM record", [], |row| row.get(0))?;
-        if let Some(at) = last_done(connection, &self.maintained, self.seen)? {
-            *self = Self { until: at, ..Self::new(self.maintained.clone()) };
+        // Records that are fewer than they were are those of a file that was begun anew.
+        let seen = if newest < self.seen { 0 } else { self.seen };
+        let done = last_done(connection, &self.maintained, seen)?;
+        let is_just_done = done.is_some() && self.seen > 0;
+        if let Some(at) = done {
+            *self = Self { until: at, done, ..Self::new(self.maintained.clone()) };
         }
-        self.seen = newest;
+        (self.seen, self.is_just_done) = (newest, is_just_done);
         let Ran { running_ms, starts, until } =
             ran(connection, &self.maintained.drive, self.until.max(first), last)?;
         self.running_ms += running_ms;
@@ -168,20 +191,44 @@ impl Count {
         Ok(())
     }
 
-    /// The same with its drive.
-    fn due_of(&self) -> Option<Due> {
-        let (part, why) = self.due()?;
-        Some((self.maintained.drive.clone(), part, why))
-    }
-
     /// Its name and why, where it is due.
     fn due(&self) -> Option<(String, String)> {
         let Maintained { part, hours, starts, .. } = &self.maintained;
         let hours = hours.filter(|hours| self.running_ms >= i64::from(*hours) * HOUR_MS);
         let starts = starts.filter(|starts| self.starts >= u64::from(*starts));
         let is_due = hours.is_some() || starts.is_some();
-        is_due.then(|| (part.clone(), format!("{part}, after {}", after(hours, starts))))
+        is_due.then(|| (part.clone(), why(part, hours, starts)))
     }
+
+    /// Its name and why, where an alarm of it stands that nobody has answered by saying that it was done. What that was counted from may be
+    /// kept no more, as behind a file that was put aside: that is no maintenance. One of other hours or starts than are asked for now says
+    /// nothing of these.
+    fn stands(&self, alarms: &[Alarm]) -> Option<(String, String)> {
+        let Maintained { drive, part, hours, starts } = &self.maintained;
+        let is_asked_for = |said: &str| {
+            [(*hours, None), (None, *starts), (*hours, *starts)].into_iter().any(|(hours, starts)| {
+                (hours.is_some() || starts.is_some()) && said == why(part, hours, starts)
+            })
+        };
+        let is_done_since = |alarm: &Alarm| {
+            let came = i64::try_from(alarm.last_unix_ms).unwrap_or(i64::MAX);
+            self.is_just_done || self.done.is_some_and(|done| done >= came)
+        };
+        let is_it = |alarm: &&Alarm| {
+            alarm.kind == AlarmKind::Maintenance
+                && alarm.is_active()
+                && alarm.drive.as_ref() == Some(drive)
+                && alarm.mark.as_ref() == Some(part)
+                && !is_done_since(alarm)
+        };
+        let said = alarms.iter().find(is_it)?.detail.clone()?;
+        is_asked_for(&said).then(|| (part.clone(), said))
+    }
+}
+
+/// That a part is due, and after what.
+fn why(part: &str, hours: Option<u32>, starts: Option<u32>) -> String {
+    format!("{part}, after {}", after(hours, starts))
 }
 
 /// When something was done last, of what is told behind a record.
@@ -206,7 +253,9 @@ fn last_done(connection: &Connection, of: &Maintained, after: i64) -> Result<Opt
 
 #[cfg(test)]
 mod tests {
+    use drive_fleet::alarms::AlarmState;
     use drived_config::testing::Folder;
+    use drived_plant::plant::testing::TestPlant;
 
     use super::*;
     use crate::{
@@ -221,6 +270,68 @@ mod tests {
     };
 
     const MINUTE_MS: i64 = 60_000;
+
+    #[tokio::test(start_paused = true)]
+    async fn an_alarm_that_stands_stands_also_behind_a_file_that_was_put_aside() {
+        let test = TestPlant::of(1).await;
+        let stands = || {
+            let alarms = test.plant.alarms().alarms;
+            alarms.into_iter().map(|view| (view.state, view.alarm.last_unix_ms)).next().unwrap()
+        };
+        let bearings = |hours| {
+            let (drive, part) = ("pump 1".to_owned(), "bearings".to_owned());
+            Count::new(Maintained { drive, part, hours: Some(hours), starts: None })
+        };
+        let due = [("bearings".to_owned(), "bearings, after 2 h of running".to_owned())];
+        test.plant.tell_maintenance("north", "pump 1", &due);
+        let came = i64::try_from(stands().1).unwrap();
+        // A run that finds a file in which nothing is.
+        let folder = Folder::new("history-maintenance-aside");
+        let mut file = store::open(&folder.file("history.sqlite")).unwrap().store;
+        let moment = |after: i64| Moment { steady_ms: after, wall_ms: came + after };
+        let mut archive = Archive::begin(moment(10));
+        archive.begin_run(&mut file.connection, "test").unwrap();
+        let mut count = bearings(2);
+        count.go_on(&file.connection).unwrap();
+        let told = tell(&test.plant, std::slice::from_ref(&count));
+        assert_eq!(stands().0, AlarmState::Unacknowledged);
+        assert_eq!(told, [("pump 1".to_owned(), due[0].0.clone(), due[0].1.clone())], "it is no news later");
+        // By whatever the wall's clock is now.
+        archive.record(done(moment(-3_600_000), "pump 1", "bearings", "anna", None));
+        archive.write_records(&mut file.connection, moment(1_000)).unwrap();
+        count.go_on(&file.connection).unwrap();
+        tell(&test.plant, std::slice::from_ref(&count));
+        assert_eq!(stands().0, AlarmState::Returned);
+        // Who asks for more hours than those by which it came asks for another thing.
+        test.plant.tell_maintenance("north", "pump 1", &due);
+        tell(&test.plant, &[bearings(2)]);
+        assert_eq!(stands().0, AlarmState::Unacknowledged);
+        tell(&test.plant, &[bearings(9)]);
+        assert_eq!(stands().0, AlarmState::Returned);
+    }
+
+    #[test]
+    fn what_was_done_is_found_also_in_a_file_that_was_begun_while_it_was_counted() {
+        let folder = Folder::new("history-maintenance-anew");
+        let moment = |at: i64| Moment { steady_ms: at, wall_ms: 1_795_219_200_000 + at };
+        let begun = |name: &str| {
+            let mut file = store::open(&folder.file(name)).unwrap().store;
+            let mut archive = Archive::begin(moment(0));
+            archive.begin_run(&mut file.connection, "test").unwrap();
+            (file, archive)
+        };
+        let (mut first, mut archive) = begun("first.sqlite");
+        (0..9).for_each(|at| archive.record(done(moment(at), "fan", "belt", "anna", None)));
+        archive.write_records(&mut first.connection, moment(9)).unwrap();
+        let (drive, part) = ("pump".to_owned(), "belt".to_owned());
+        let mut count = Count::new(Maintained { drive, part, hours: Some(1), starts: None });
+        count.go_on(&first.connection).unwrap();
+        let (mut second, mut archive) = begun("second.sqlite");
+        archive.record(done(moment(20), "pump", "belt", "anna", None));
+        archive.write_records(&mut second.connection, moment(20)).unwrap();
+        count.go_on(&second.connection).unwrap();
+        assert_eq!((count.done, count.is_just_done), (Some(moment(20).wall_ms), true));
+    }
 
     #[test]
     fn hours_and_starts_are_counted_once_however_often_they_are_looked_at_and_from_when_it_was_done() {
