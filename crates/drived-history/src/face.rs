@@ -17,6 +17,7 @@ use tokio::{
 use crate::{
     clocks::Clocks,
     config::{HistoryConfig, HistoryEntry},
+    doubt::Asked,
     forward,
     listen::Listening,
     maintenance,
@@ -166,7 +167,7 @@ impl Recorder {
         let limits = config.limits;
         let past =
             InFile { path: path.clone(), limits, inbox: inbox.clone(), clocks, done: Arc::clone(&done) };
-        around.plant.set_past(Some(Arc::new(past)));
+        around.plant.set_past(Some(Arc::new(Asked(past))));
         let ledger = Ledger::new(path.clone(), inbox.clone(), clocks);
         around.plant.set_untold(Some(Arc::new(ledger)));
         let (health, seen) = watch::channel(Health::Opening);

@@ -19,6 +19,7 @@ pub mod column;
 pub mod config;
 pub mod curve;
 mod departure;
+mod doubt;
 mod errors;
 mod face;
 pub mod forecast;

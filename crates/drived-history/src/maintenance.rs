@@ -11,6 +11,7 @@ use tokio::{sync::Notify, time::timeout};
 
 use crate::{
     clocks::Clocks,
+    doubt::ask,
     read::{Filter, History, Ran, bounds, ran, records},
     record::{Kind, Moment, Record},
     store::StoreError,
@@ -99,16 +100,18 @@ pub(crate) async fn count(
     // What was due at the beginning became so in another run, which has told it.
     let mut known: Option<Vec<Due>> = None;
     loop {
-        let (path, writing, mut next) = (path.clone(), inbox.clone(), counts.clone());
+        let (path, writing, before) = (path.clone(), inbox.clone(), counts.clone());
         let counted = tokio::task::spawn_blocking(move || {
             writing.have_written(WRITTEN_WITHIN);
-            let mut history = History::open(&path)?;
-            // What becomes blocks meanwhile is counted once.
-            let at_once = history.0.transaction()?;
-            next.iter_mut().try_for_each(|count| count.go_on(&at_once))?;
-            Ok::<_, StoreError>(next)
+            ask(&writing, || {
+                let (mut history, mut next) = (History::open(&path)?, before.clone());
+                // What becomes blocks meanwhile is counted once.
+                let at_once = history.0.transaction()?;
+                next.iter_mut().try_for_each(|count| count.go_on(&at_once))?;
+                Ok::<_, StoreError>(next)
+            })
         });
-        // A file that cannot be read now has an alarm of its own.
+        // A file that cannot be read now has an alarm of its own, or is put aside with one.
         if let Ok(Ok(counted)) = counted.await {
             counts = counted;
             let due = tell(&plant, &counts);

@@ -41,7 +41,10 @@ pub(crate) struct InFile {
 
 impl From<StoreError> for PastError {
     fn from(error: StoreError) -> Self {
-        Self::Unreadable(error.to_string())
+        match error.is_damage() {
+            true => Self::Damaged(error.to_string()),
+            false => Self::Unreadable(error.to_string()),
+        }
     }
 }
 

@@ -16,6 +16,7 @@ use rusqlite::Connection;
 
 use crate::{
     clocks::Clocks,
+    doubt::ask,
     outages::{END, Outage, Outages},
     read::{self, History, Page, Read},
     store,
@@ -83,7 +84,7 @@ impl Untold for Ledger {
     fn note(&self, told: &Told) -> Result<(), PastError> {
         let mut all = self.all.lock().unwrap_or_else(PoisonError::into_inner);
         if !all.contains_key(&told.whom) {
-            let kept = store::outages(&History::open(&self.path)?.0, &told.whom)?;
+            let kept = ask(&self.inbox, || store::outages(&History::open(&self.path)?.0, &told.whom))?;
             all.insert(told.whom.clone(), Outages::of(kept, self.clocks.of(told.begun)));
         }
         let Some(outages) = all.get_mut(&told.whom) else { return Ok(()) };

@@ -16,6 +16,7 @@ use self::{
     post::post,
 };
 use crate::{
+    doubt::ask,
     read::History,
     store::{Place, StoreError},
     write::inbox::Inbox,
@@ -41,7 +42,7 @@ pub async fn run(path: PathBuf, forward: Forward, inbox: Inbox, health: watch::S
     // A server that has taken nothing yet may refuse everything for how it was named: a database that is missing is 400 at some.
     let mut has_taken = false;
     loop {
-        match look(path.clone(), forward.target.to_string(), place.clone()).await {
+        match look(path.clone(), forward.target.to_string(), place.clone(), inbox.clone()).await {
             Ok(Some(part)) => {
                 if let Some(skipped) = part.skipped() {
                     tracing::warn!("{}: {skipped}", forward.target);
@@ -53,21 +54,27 @@ pub async fn run(path: PathBuf, forward: Forward, inbox: Inbox, health: watch::S
                 }
                 place = Some(next);
             }
-            // The file is not there yet, or cannot be read now: its own alarm tells that.
+            // The file is not there yet, or cannot be read now: its own alarm tells that. One that is damaged is put aside.
             Ok(None) | Err(_) => sleep(LOOK).await,
         }
     }
 }
 
-async fn look(path: PathBuf, target: String, place: Option<Place>) -> Result<Option<Part>, StoreError> {
-    let read = tokio::task::spawn_blocking(move || {
+async fn look(
+    path: PathBuf,
+    target: String,
+    place: Option<Place>,
+    inbox: Inbox,
+) -> Result<Option<Part>, StoreError> {
+    let read = move || {
         let history = History::open(&path)?;
-        let place = match place {
-            Some(place) => place,
+        let place = match &place {
+            Some(place) => place.clone(),
             None => Place::kept(&history.0, &target)?,
         };
         next_part(&history.0, &place)
-    });
+    };
+    let read = tokio::task::spawn_blocking(move || ask(&inbox, read));
     read.await.unwrap_or(Ok(None))
 }
 

@@ -11,7 +11,7 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-use rusqlite::{Connection, ErrorCode, OpenFlags};
+use rusqlite::{Connection, ErrorCode, OpenFlags, types::Type};
 
 use drived_config::kept::Kept;
 
@@ -74,7 +74,14 @@ impl StoreError {
 
 fn is_damage(error: &rusqlite::Error) -> bool {
     let code = error.sqlite_error_code();
-    let is_damage = matches!(code, Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase));
+    let of_sqlite = matches!(code, Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase));
+    // What SQLite gives as it stands though nobody here has written it so: a text that is none, a number where a text was.
+    let is_other = match error {
+        rusqlite::Error::Utf8Error(..) => true,
+        rusqlite::Error::InvalidColumnType(_, _, found) => *found != Type::Null,
+        _ => false,
+    };
+    let is_damage = of_sqlite || is_other;
     drive_fleet::mutant!("full-disk-is-damage", is_damage, is_damage || code == Some(ErrorCode::DiskFull))
 }
 

@@ -3,7 +3,7 @@
 use std::{fs, os::unix::fs::PermissionsExt as _, time::Duration};
 
 use drived_config::testing::Folder;
-use drived_plant::plant::past::{ParameterRead, Past, RecordView};
+use drived_plant::plant::past::{ParameterRead, Past, PastError, RecordView, RecordsAsked};
 use rusqlite::Connection;
 use tokio::sync::watch;
 
@@ -485,6 +485,60 @@ async fn a_file_that_is_damaged_while_it_is_written_is_put_aside_and_a_new_one_b
     thread.join().unwrap();
     let told = words(&History::open(&path).unwrap().0);
     assert!(told.contains(&"damaged".to_owned()) && told.contains(&"ended".to_owned()), "{told:?}");
+}
+
+/// A file that a run before has left, in which something is overwritten where no writer looks.
+fn damaged(path: &std::path::Path, overwrite: fn(&mut [u8], usize)) {
+    let mut store = store::open(path).unwrap().store;
+    let mut archive = Archive::begin(moment(0));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    for number in 0..50 {
+        archive.record(event(moment(number), "pump", "tripped and spoilt"));
+    }
+    archive.end_run(&mut store.connection, moment(100)).unwrap();
+    let of = "SELECT rootpage FROM sqlite_schema WHERE name = 'parameter_of'";
+    let page: i64 = store.connection.query_row(of, [], |row| row.get(0)).unwrap();
+    drop(store);
+    let mut bytes = fs::read(path).unwrap();
+    overwrite(&mut bytes, usize::try_from(page - 1).unwrap() * 4_096);
+    fs::write(path, bytes).unwrap();
+}
+
+#[tokio::test]
+async fn what_only_readers_find_damaged_is_put_aside_and_a_new_one_begun() {
+    let zeroed = |bytes: &mut [u8], page: usize| bytes[page..page + 4_096].fill(0);
+    let flipped = |bytes: &mut [u8], _: usize| {
+        let text = b"tripped and spoilt at";
+        let at = bytes.windows(text.len()).position(|found| found == text).unwrap();
+        bytes[at + 3] ^= 0x80;
+    };
+    let folder = Folder::new("history-doubted");
+    for (name, overwrite) in [("zeroed", zeroed as fn(&mut [u8], usize)), ("flipped", flipped)] {
+        let path = folder.file(name);
+        damaged(&path, overwrite);
+        let (inbox, mut health, thread) = writer(path.clone());
+        becomes(&mut health, |health| *health == Health::Writing).await;
+        let (clocks, done) = (crate::clocks::Clocks::begin(), std::sync::Arc::default());
+        let (limits, waiting) = (Limits::default(), inbox.clone());
+        let past = crate::past::InFile { path: path.clone(), limits, inbox: waiting, clocks, done };
+        let past = crate::doubt::Asked(past);
+        let ask = |past: &crate::doubt::Asked| {
+            let all = RecordsAsked { to_unix_ms: i64::MAX, ..RecordsAsked::default() };
+            past.parameters("pump").and_then(|_| past.records(&all))
+        };
+        let refused = ask(&past).unwrap_err();
+        assert!(matches!(refused, PastError::Damaged(_)), "{name}: {refused}");
+        becomes(&mut health, |health| matches!(health, Health::Failing(_))).await;
+        becomes(&mut health, |health| *health == Health::Writing).await;
+        let told = ask(&past).unwrap().records.into_iter().map(|found| found.what).collect::<Vec<_>>();
+        assert!(told.contains(&"damaged".to_owned()), "{name}: {told:?}");
+        // What was said of the one that is aside says nothing of this one.
+        inbox.is_damaged(0, "of another".to_owned());
+        inbox.end();
+        thread.join().unwrap();
+        let kept = words(&History::open(&path).unwrap().0);
+        assert_eq!(kept.iter().filter(|what| *what == "damaged").count(), 1, "{name}: {kept:?}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::{
     collections::BTreeMap,
     sync::{
         Arc, Condvar, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicI64, Ordering},
+        atomic::{AtomicI64, AtomicU64, Ordering},
     },
     time::Duration,
 };
@@ -49,6 +49,8 @@ pub struct Batch {
     /// and whether it is to be written before values are.
     pub outages_at_once: bool,
     pub lost: Lost,
+    /// In which file somebody who reads has found what cannot be right, and what.
+    pub damaged: Option<(u64, String)>,
     /// How often somebody has asked for what waits to be written, since the beginning.
     pub asked: u64,
     pub is_end: bool,
@@ -87,6 +89,8 @@ struct Inner {
     is_written: Condvar,
     /// Up to when what was read is in the file, by the daemon's own clock.
     written_until: AtomicI64,
+    /// How many files were put aside.
+    aside: AtomicU64,
 }
 
 impl Default for Inner {
@@ -97,6 +101,7 @@ impl Default for Inner {
             written: Mutex::default(),
             is_written: Condvar::new(),
             written_until: AtomicI64::new(i64::MIN),
+            aside: AtomicU64::new(0),
         }
     }
 }
@@ -198,6 +203,23 @@ impl Inbox {
         self.0.is_written.notify_all();
     }
 
+    /// Which file is written: another one behind each that was put aside.
+    #[must_use]
+    pub fn file(&self) -> u64 {
+        self.0.aside.load(Ordering::Acquire)
+    }
+
+    /// The file has another name, and the next one is begun.
+    pub fn has_put_aside(&self) {
+        self.0.aside.fetch_add(1, Ordering::AcqRel);
+    }
+
+    /// Takes that a file was found damaged by somebody who read it, as it was called before he opened it.
+    pub fn is_damaged(&self, file: u64, why: String) {
+        self.lock().damaged = Some((file, why));
+        self.0.rings.notify_one();
+    }
+
     /// Nothing comes any more.
     pub fn end(&self) {
         self.lock().is_end = true;
@@ -207,7 +229,8 @@ impl Inbox {
     /// What has come, after `patience` or as soon as a record is there.
     #[must_use]
     pub fn take(&self, patience: Duration) -> Batch {
-        let is_quiet = |waiting: &mut Batch| waiting.records.is_empty() && !waiting.is_end;
+        let is_quiet =
+            |waiting: &mut Batch| waiting.records.is_empty() && waiting.damaged.is_none() && !waiting.is_end;
         let waited = self.0.rings.wait_timeout_while(self.lock(), patience, is_quiet);
         let (mut waiting, _) = waited.unwrap_or_else(PoisonError::into_inner);
         let (is_end, asked) = (waiting.is_end, waiting.asked);

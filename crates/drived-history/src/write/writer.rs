@@ -1,7 +1,7 @@
 //! The one thread that writes. Whatever the disk does, nobody waits for it.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     thread::JoinHandle,
     time::{Duration, Instant},
 };
@@ -68,6 +68,8 @@ struct Work<C> {
     /// It is not tried again before somebody does something about the file.
     is_given_up: bool,
     has_to_tidy: bool,
+    /// Which file somebody who read it has found damaged, and by what.
+    damaged: Option<(u64, String)>,
     /// How often somebody had asked for what waits when that was written last, and when.
     asked: u64,
     asked_at: i64,
@@ -83,6 +85,7 @@ impl<C: Fn() -> Moment> Work<C> {
             tried: None,
             is_given_up: false,
             has_to_tidy: true,
+            damaged: None,
             asked: 0,
             asked_at: i64::MIN / 2,
         }
@@ -91,7 +94,8 @@ impl<C: Fn() -> Moment> Work<C> {
     fn run(mut self) {
         loop {
             let began = Instant::now();
-            let batch = self.writer.inbox.take(LOOK);
+            let mut batch = self.writer.inbox.take(LOOK);
+            self.damaged = batch.damaged.take().or_else(|| self.damaged.take());
             let (now, is_end, asked) = ((self.writer.clock)(), batch.is_end, batch.asked);
             self.archive.take(batch, now);
             self.archive.look_at_clock(now);
@@ -126,6 +130,14 @@ impl<C: Fn() -> Moment> Work<C> {
             Some(store) => store,
             None => self.open(now)?,
         };
+        // What stands where nothing is written is found by whoever reads. The last words are written all the same.
+        if let Some((file, why)) = self.damaged.take()
+            && file == self.writer.inbox.file()
+            && !is_end
+        {
+            drop(store);
+            return Err(self.put_aside(&why, now));
+        }
         let connection = &mut store.connection;
         let written = (|| {
             if self.archive.has_records() {
@@ -150,10 +162,7 @@ impl<C: Fn() -> Moment> Work<C> {
             && error.is_damage()
         {
             drop(store);
-            let aside = store::put_aside(&self.writer.path)?;
-            self.tell_aside(&aside, &error.to_string(), now);
-            self.archive.begin_file(now);
-            return Err(StoreError::Damaged(error.to_string()));
+            return Err(self.put_aside(&error.to_string(), now));
         }
         self.store = Some(store);
         written
@@ -161,8 +170,9 @@ impl<C: Fn() -> Moment> Work<C> {
 
     fn open(&mut self, now: Moment) -> Result<Store, StoreError> {
         let mut opened = store::open(&self.writer.path)?;
-        if let Some((aside, why)) = &opened.aside {
-            self.tell_aside(aside, why, now);
+        if let Some((aside, why)) = opened.aside.take() {
+            drop(opened);
+            return Err(self.is_aside(&aside, &why, now));
         }
         let begun = self
             .archive
@@ -172,16 +182,29 @@ impl<C: Fn() -> Moment> Work<C> {
             // Its head was sound, and what lies behind it is not.
             Err(error) if error.is_damage() => {
                 drop(opened);
-                let aside = store::put_aside(&self.writer.path)?;
-                self.tell_aside(&aside, &error.to_string(), now);
-                self.archive.begin_file(now);
-                Err(StoreError::Damaged(error.to_string()))
+                Err(self.put_aside(&error.to_string(), now))
             }
             Err(error) => Err(error),
         }
     }
 
-    fn tell_aside(&mut self, aside: &std::path::Path, why: &str, now: Moment) {
+    /// Puts the file aside, which is closed. It is an alarm until the next one is written.
+    fn put_aside(&mut self, why: &str, now: Moment) -> StoreError {
+        match store::put_aside(&self.writer.path) {
+            Ok(aside) => self.is_aside(&aside, why, now),
+            Err(error) => error,
+        }
+    }
+
+    /// It is aside: what comes belongs to another one.
+    fn is_aside(&mut self, aside: &Path, why: &str, now: Moment) -> StoreError {
+        self.writer.inbox.has_put_aside();
+        self.tell_aside(aside, why, now);
+        self.archive.begin_file(now);
+        StoreError::Damaged(why.to_owned())
+    }
+
+    fn tell_aside(&mut self, aside: &Path, why: &str, now: Moment) {
         let text = format!(
             "the history was damaged ({why}): it is in {} now, and a new one was begun",
             aside.display()

@@ -132,6 +132,9 @@ pub enum PastError {
     /// It cannot be read now.
     #[error("the history cannot be read: {0}")]
     Unreadable(String),
+    /// What is kept cannot be right.
+    #[error("the history is damaged ({0}): it is put aside, and a new one is begun")]
+    Damaged(String),
     /// Nobody waits for it any more.
     #[error("nobody waits for the answer any more")]
     GivenUp,
