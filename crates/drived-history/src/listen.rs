@@ -199,7 +199,7 @@ async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks, wanted: Wanted) {
                     }
                 }
             }
-            // A reload, or too much at once: whether something is missing nobody knows.
+            // Too much at once: whether something is missing nobody knows.
             Next::Reset(_) => inbox.record(told_anew(clocks.now())),
             Next::End => return,
         }
@@ -208,7 +208,7 @@ async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks, wanted: Wanted) {
 }
 
 fn told_anew(now: Moment) -> Record {
-    let text = "the configuration was read again, or too much happened at once: what was told just before may be missing here";
+    let text = "too much happened at once: what was told just before may be missing here";
     Record::of_history(now, "stream_anew", text)
 }
 

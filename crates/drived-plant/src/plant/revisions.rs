@@ -62,6 +62,8 @@ struct Ring {
     last: u64,
     frames: VecDeque<Bytes>,
     bytes: usize,
+    /// What a reader has before this number is of other lines, drives or groups.
+    anew: u64,
 }
 
 /// What a reader gets.
@@ -80,7 +82,7 @@ impl Revisions {
     /// numbers of this one.
     pub(crate) fn new() -> Self {
         let last = unix(Instant::now());
-        let ring = Ring { last, frames: VecDeque::new(), bytes: 0 };
+        let ring = Ring { last, frames: VecDeque::new(), bytes: 0, anew: last };
         Self { ring: Mutex::new(ring), last: watch::Sender::new(last), kept: AtomicU64::new(last) }
     }
 
@@ -98,26 +100,20 @@ impl Revisions {
     pub fn push(&self, subject: Subject, data: &impl Serialize) -> u64 {
         let data = line(data);
         let mut ring = self.ring();
-        ring.last += 1;
-        let frame = Bytes::from(frame(ring.last, subject.name(), &data));
-        ring.bytes += frame.len();
-        ring.frames.push_back(frame);
-        while ring.frames.len() > KEPT || ring.bytes > KEPT_BYTES {
-            let Some(oldest) = ring.frames.pop_front() else { break };
-            ring.bytes -= oldest.len();
-        }
-        let last = ring.last;
+        let last = ring.last + 1;
+        ring.add(frame(last, subject.name(), &data).into());
         // Still under the lock, so that readers see the numbers rise.
         self.last.send_replace(last);
         last
     }
 
-    /// Lines, drives or groups are others: every reader is told to read the state again.
+    /// Lines, drives or groups are others: every reader is told to read the state again. Who keeps everything has no state to read, and what
+    /// happened before is no less true: it stays for him.
     pub fn begin_anew(&self) {
         let mut ring = self.ring();
-        ring.frames.clear();
-        ring.bytes = 0;
-        ring.last += 1;
+        // Each number has its place.
+        ring.add(Bytes::new());
+        ring.anew = ring.last;
         let last = ring.last;
         self.last.send_replace(last);
     }
@@ -126,7 +122,7 @@ impl Revisions {
     pub fn reader(&self, since: Option<u64>) -> Reader {
         let last = self.last.subscribe();
         let since = since.unwrap_or(*last.borrow());
-        Reader { since, last }
+        Reader { since, last, is_keeper: false }
     }
 
     /// The reader that keeps everything: from where it has kept, or from the oldest that is still there; and whether something
@@ -135,7 +131,8 @@ impl Revisions {
         let ring = self.ring();
         let oldest = ring.last - ring.frames.len() as u64;
         let kept = self.kept.load(Ordering::Relaxed);
-        (Reader { since: kept.max(oldest), last: self.last.subscribe() }, kept < oldest)
+        let reader = Reader { since: kept.max(oldest), last: self.last.subscribe(), is_keeper: true };
+        (reader, kept < oldest)
     }
 
     /// Everything up to where this reader has come is kept.
@@ -150,7 +147,7 @@ impl Revisions {
     pub async fn next(&self, reader: &mut Reader) -> Next {
         loop {
             reader.last.mark_unchanged();
-            match self.ring().after(reader.since) {
+            match self.ring().after(reader) {
                 Some((_, frames)) if frames.is_empty() => {}
                 Some((last, frames)) => {
                     reader.since = last;
@@ -174,9 +171,24 @@ impl Revisions {
 }
 
 impl Ring {
-    /// The next frames after a revision, and the number of the last of them; `None` when some of them are gone, or it is none
-    /// of this ring.
-    fn after(&self, since: u64) -> Option<(u64, Vec<Bytes>)> {
+    /// Adds a frame of the next number.
+    fn add(&mut self, frame: Bytes) {
+        self.last += 1;
+        self.bytes += frame.len();
+        self.frames.push_back(frame);
+        while self.frames.len() > KEPT || self.bytes > KEPT_BYTES {
+            let Some(oldest) = self.frames.pop_front() else { break };
+            self.bytes -= oldest.len();
+        }
+    }
+
+    /// The next frames for a reader, and the number of the last of them; `None` when some of them are gone, are of other lines, drives or
+    /// groups than he has read, or he is none of this ring.
+    fn after(&self, Reader { since, is_keeper, .. }: &Reader) -> Option<(u64, Vec<Bytes>)> {
+        let since = *since;
+        if since < self.anew && !is_keeper {
+            return None;
+        }
         let count = usize::try_from(self.last.checked_sub(since)?).ok()?;
         let first = self.frames.len().checked_sub(count)?;
         let taken: Vec<Bytes> = self.frames.iter().skip(first).take(AT_ONCE).cloned().collect();
@@ -203,6 +215,7 @@ pub fn data_of(frame: &[u8], subject: Subject) -> Option<(u64, &[u8])> {
 pub struct Reader {
     since: u64,
     last: watch::Receiver<u64>,
+    is_keeper: bool,
 }
 
 #[cfg(test)]
@@ -269,6 +282,33 @@ mod tests {
         let Next::Frames(_) = revisions.next(&mut late).await else {
             panic!("what is gone is gone, and the rest is told")
         };
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn whoever_keeps_everything_keeps_also_what_was_told_before_a_reload_began_anew() {
+        let revisions = Revisions::new();
+        let mut reader = revisions.reader(None);
+        let (mut keeper, _) = revisions.keeper();
+        revisions.push(Subject::Event, &1);
+        revisions.begin_anew();
+        let since = revisions.last();
+        revisions.push(Subject::Event, &2);
+        assert!(matches!(revisions.next(&mut reader).await, Next::Reset(_)));
+        assert!(matches!(revisions.next(&mut revisions.reader(Some(since - 1))).await, Next::Reset(_)));
+        let Next::Frames(frames) = revisions.next(&mut revisions.reader(Some(since))).await else {
+            panic!("frames")
+        };
+        assert_eq!(frames.len(), 1, "who has read the state behind it goes on");
+        let events = |frames: &[Bytes]| {
+            let data = frames.iter().filter_map(|frame| data_of(frame, Subject::Event));
+            data.map(|(_, data)| data.to_vec()).collect::<Vec<_>>()
+        };
+        let Next::Frames(frames) = revisions.next(&mut keeper).await else { panic!("frames") };
+        assert_eq!(events(&frames), [b"1", b"2"]);
+        // One that is opened anew by the reload has them too.
+        let (mut anew, is_gone) = revisions.keeper();
+        let Next::Frames(frames) = revisions.next(&mut anew).await else { panic!("frames") };
+        assert_eq!((events(&frames).len(), is_gone), (2, false));
     }
 
     #[tokio::test(start_paused = true)]
