@@ -237,28 +237,38 @@ fn what_is_too_much_goes_and_what_is_finest_goes_first() {
 }
 
 #[test]
-fn a_file_that_is_too_large_loses_freeze_frames_with_what_belongs_to_them() {
-    let folder = Folder::new("history-size-frames");
-    let mut store = store::open(&folder.file("history.sqlite")).unwrap().store;
-    for id in 1..=1_000 {
-        store
-            .connection
-            .execute_batch(&format!(
-                "INSERT INTO frame (id, drive, why, at_ms, start_ms, end_ms, is_whole) VALUES ({id}, 'pump', 'tripped', {id}, 0, 1, 1);
-                 INSERT INTO frame_block (frame, quantity, start_ms, end_ms, data) VALUES ({id}, 1, 0, 1, zeroblob(100))"
-            ))
-            .unwrap();
-    }
-    let archive = Archive::begin(moment(0));
-    let tiny = Limits { bytes: 1, ..Limits::default() };
-    while tidy::trim(&mut store.connection, archive.lived(moment(0)), &tiny).unwrap() {}
-    for table in ["frame", "frame_block"] {
-        let left: i64 = store
-            .connection
-            .query_row(&format!("SELECT count(*) FROM {table}"), [], |row| row.get(0))
-            .unwrap();
-        assert_eq!(left, 0, "{table}");
-    }
+fn freeze_frames_go_with_what_was_kept_of_them_where_it_is_too_much_and_where_they_are_too_old() {
+    let folder = Folder::new("history-frames-go");
+    let kept = |name: &str| {
+        let mut store = store::open(&folder.file(name)).unwrap().store;
+        let (mut archive, mut pump) = (Archive::begin(moment(0)), Pump::of("pump"));
+        archive.begin_run(&mut store.connection, "test").unwrap();
+        for second in 1..400 {
+            let now = moment(second * 1_000);
+            pump.read(&mut archive, now, &[(HZ, second * 10)]);
+            if second % 100 == 0 {
+                archive.record(event(now, "pump", "tripped"));
+            }
+        }
+        archive.end_run(&mut store.connection, moment(400_000)).unwrap();
+        while crate::write::frames::fill(&mut store.connection, archive.run().unwrap(), 400_000).unwrap() {}
+        let blocks = of(&store.connection, "frame_block");
+        assert!(of(&store.connection, "frame") == 3 && blocks >= 3, "{blocks}");
+        (store, archive)
+    };
+    let (mut large, archive) = kept("large.sqlite");
+    let none = Limits { bytes: 0, ..Limits::default() };
+    while tidy::trim(&mut large.connection, archive.lived(moment(500_000)), &none).unwrap() {}
+    assert_eq!(["frame", "frame_block", "record"].map(|table| of(&large.connection, table)), [0; 3]);
+    let (mut old, archive) = kept("old.sqlite");
+    let later = archive.lived(moment(400_000 + Limits::default().years_ms + 2 * age::MARKED_EVERY_MS));
+    while tidy::trim(&mut old.connection, later, &Limits::default()).unwrap() {}
+    assert_eq!(["frame", "frame_block"].map(|table| of(&old.connection, table)), [0; 2]);
+}
+
+/// How many rows a table has.
+fn of(connection: &Connection, table: &str) -> i64 {
+    connection.query_row(&format!("SELECT count(*) FROM {table}"), [], |row| row.get(0)).unwrap()
 }
 
 /// A drive that comes and goes writes words as long as it does so.

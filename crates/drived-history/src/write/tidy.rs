@@ -343,6 +343,7 @@ fn trim_table(connection: &Connection, table: &str, last: i64) -> Result<usize, 
     Ok(connection.prepare_cached(&sql)?.execute([last])?)
 }
 
+/// How those are asked for that go at once.
 fn oldest(table: &str, last: i64) -> String {
     let at_once = if last == i64::MAX { FEW } else { AT_ONCE };
     format!("SELECT id FROM {table} WHERE id <= ?1 ORDER BY id LIMIT {at_once}")
@@ -351,11 +352,13 @@ fn oldest(table: &str, last: i64) -> String {
 /// What belongs to a freeze-frame goes before it: the file lets none go that something in it names.
 fn trim_frames(connection: &Connection, last: i64) -> Result<usize, StoreError> {
     let blocks = format!("DELETE FROM frame_block WHERE frame IN ({})", oldest("frame", last));
-    connection.prepare_cached(&blocks)?.execute([last])?;
-    let gone = trim_table(connection, "frame", last)?;
+    let transaction = connection.unchecked_transaction()?;
+    transaction.prepare_cached(&blocks)?.execute([last])?;
+    let gone = trim_table(&transaction, "frame", last)?;
     if gone > 0 {
-        captures::trim(connection)?;
+        captures::trim(&transaction)?;
     }
+    transaction.commit()?;
     Ok(gone)
 }
 
