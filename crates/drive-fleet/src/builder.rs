@@ -161,6 +161,8 @@ pub struct FleetBuilder {
     problem: Option<FleetError>,
     refuses_plans: bool,
     runs: Option<mpsc::UnboundedSender<RunKept>>,
+    /// So many readers miss nothing of the start.
+    readers: usize,
 }
 
 impl Fleet {
@@ -174,6 +176,7 @@ impl Fleet {
             problem: None,
             refuses_plans: true,
             runs: None,
+            readers: 1,
         }
     }
 }
@@ -310,6 +313,13 @@ impl FleetBuilder {
         self
     }
 
+    /// So many readers of [events](Fleet::events) get them from the start of the fleet, however long after it they begin to read: the first
+    /// that ask. Otherwise it is the first alone.
+    pub const fn readers_from_the_start(mut self, readers: usize) -> Self {
+        self.readers = readers;
+        self
+    }
+
     /// Starts also if a line cannot keep its periods or feed its watchdogs: for a tool that commands a drive for a moment,
     /// whatever its line is like.
     pub const fn whatever_the_plan(mut self) -> Self {
@@ -325,6 +335,9 @@ impl FleetBuilder {
     /// [`FleetError`] with what does not fit, and the arithmetic where it is arithmetic.
     pub fn start(mut self) -> Result<Fleet, FleetError> {
         let (events, first) = broadcast::channel(EVENTS);
+        // Before any drive is asked: whoever comes later has missed what happened by then.
+        let others = (1..self.readers).map(|_| events.subscribe());
+        let first = std::iter::once(first).chain(others).take(self.readers).collect();
         let events = Teller::new(events, self.runs.take());
         let (lines, drives) = self.enlist(&events)?;
         let mut members = Members::default();

@@ -91,8 +91,8 @@ pub(crate) struct Inner {
     acts: AtomicU64,
     /// Where the steps of a group's commands go on when nobody polls them.
     pub(crate) runtime: Handle,
-    /// For the first reader, which misses nothing of the start.
-    first: Mutex<Option<broadcast::Receiver<Event>>>,
+    /// For the first readers, which miss nothing of the start.
+    first: Mutex<Vec<broadcast::Receiver<Event>>>,
 }
 
 impl fmt::Debug for Fleet {
@@ -104,14 +104,14 @@ impl fmt::Debug for Fleet {
 }
 
 impl Fleet {
-    pub(crate) fn new(members: Members, events: Teller, first: broadcast::Receiver<Event>) -> Self {
+    pub(crate) fn new(members: Members, events: Teller, first: Vec<broadcast::Receiver<Event>>) -> Self {
         let inner = Inner {
             members: RwLock::new(Arc::new(members)),
             changing: Mutex::default(),
             events: Mutex::new(Some(events)),
             acts: AtomicU64::new(0),
             runtime: Handle::current(),
-            first: Mutex::new(Some(first)),
+            first: Mutex::new(first),
         };
         Self { inner: Arc::new(inner) }
     }
@@ -147,10 +147,11 @@ impl Fleet {
         members.on_line(line).map(|entry| DriveHandle::new(Arc::clone(entry))).collect()
     }
 
-    /// What happens to the drives, from now on; the first reader gets it from the start of the fleet.
+    /// What happens to the drives, from now on; the first reader gets it from the start of the fleet, and as many as
+    /// [were asked for](FleetBuilder::readers_from_the_start).
     #[must_use]
     pub fn events(&self) -> Events {
-        let first = self.inner.first.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let first = self.inner.first.lock().unwrap_or_else(PoisonError::into_inner).pop();
         Events::new(first.or_else(|| self.sender().map(|events| events.subscribe())))
     }
 

@@ -10,7 +10,7 @@ use std::{
 use drive_atv312::Atv312;
 use drive_bus::{Line, LineConfig};
 use drive_core::{Direction, Frequency, SerialSettings, StopMode};
-use drive_fleet::{DriveHandle, DriveSettings, Fleet};
+use drive_fleet::{DriveHandle, DriveSettings, Fleet, Received};
 use drive_sim::{SimLine, SimSlave, Wiring, models::atv312};
 use tokio::runtime::{Builder, Runtime};
 
@@ -75,6 +75,31 @@ fn motors_are_stopped_while(hold: impl FnOnce(DriveHandle, Sender<()>, Receiver<
     assert!(!reader.is_finished(), "it was not held any more");
     let_go.send(()).unwrap();
     reader.join().unwrap();
+}
+
+#[test]
+fn as_many_readers_as_were_asked_for_get_what_happens_from_the_start_of_the_fleet() {
+    let ours = runtime();
+    ours.block_on(async {
+        let settings = SerialSettings::MODBUS_DEFAULT;
+        let site = SimLine::new(Wiring::rtu(settings));
+        site.add(1, atv312::Atv312::under_bus_control()).unwrap();
+        let line = Line::over(site.in_memory(), LineConfig::stream(settings));
+        let pump = DriveSettings::controlled("pump");
+        let fleet = Fleet::builder()
+            .line("north", line)
+            .drive("north", 1, pump, |port, slave| Box::new(Atv312::new(port, slave)))
+            .readers_from_the_start(3)
+            .start()
+            .unwrap();
+        fleet.drive("pump").unwrap().ready(PATIENCE).await.unwrap();
+        let mut readers = [fleet.events(), fleet.events(), fleet.events()];
+        for reader in &mut readers {
+            let first = tokio::time::timeout(PATIENCE, reader.recv()).await.unwrap();
+            let Received::Event(first) = first else { panic!("{first:?}") };
+            assert_eq!(first.kind.name(), "connected");
+        }
+    });
 }
 
 #[test]

@@ -67,6 +67,9 @@ use drived_words::{
     signals::{Ending, Wish, Wishes},
 };
 
+/// So many follow what happens from the start on: what is told on stdout, the log, the records of watchdogs and of EEPROMs, the plant with its
+/// history, who is driven by a profile, and the audit log.
+const READERS: usize = 7;
 /// How long the disk has for the last records of the audit log.
 const AUDITED_WITHIN: Duration = Duration::from_secs(2);
 /// So soon a page has its address, unless somebody else has it.
@@ -123,7 +126,9 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let kept = kept::Kept::open(state, &places);
     let (tell_runs, told_runs) = mpsc::unbounded_channel();
     let builder = build(&config, &lines, |place| kept.of(place)).keep_runs(tell_runs);
-    let fleet = builder.start().map_err(|error| Failure::Input(error.to_string()))?;
+    // A drive may answer, or show a trip, before the last of them reads.
+    let fleet =
+        builder.readers_from_the_start(READERS).start().map_err(|error| Failure::Input(error.to_string()))?;
     // Nobody is watched any more for a run that was ended.
     let watched = Watched::in_folder(folder, &places, |place| kept.runs(place));
     let runs = runs::follow(kept.runs.clone(), told_runs);
