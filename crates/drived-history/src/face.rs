@@ -5,7 +5,6 @@ use std::{any::Any, pin::Pin, sync::Arc, thread::JoinHandle, time::Duration};
 use drived_config::config::Entry as _;
 use drived_face::{
     ConfigError, Configured, Face, Failure, Key, Meaning, Open, Opening, Plant, Site, Surroundings, Written,
-    same,
 };
 use drived_plant::plant::views::NoticeView;
 use serde_json::{Map, Value, json};
@@ -74,8 +73,10 @@ impl Face for BlackBox {
 }
 
 impl Configured for HistoryConfig {
+    /// What it is expected to become goes with the drives: a drive more is no other history.
     fn is_same(&self, other: &dyn Configured) -> bool {
-        same(self, other)
+        let other = (other as &dyn Any).downcast_ref::<Self>();
+        other.is_some_and(|other| Self { forecast: self.forecast, ..other.clone() } == *self)
     }
 
     fn meaning(&self) -> Vec<Meaning> {
@@ -162,6 +163,7 @@ struct Recording {
 impl Recorder {
     fn open(config: HistoryConfig, around: &Surroundings) -> Self {
         let Some(path) = config.file else { return Self(None) };
+        let is_anew = around.plant.has_kept_past();
         let (inbox, clocks) = (Inbox::default(), Clocks::begin());
         let done = Arc::new(Notify::new());
         let limits = config.limits;
@@ -188,8 +190,14 @@ impl Recorder {
             clocks,
         );
         tasks.spawn(counted);
-        let writer =
-            Writer { path, limits: config.limits, inbox: inbox.clone(), clock, health: health.clone() };
+        let writer = Writer {
+            path,
+            limits: config.limits,
+            inbox: inbox.clone(),
+            clock,
+            health: health.clone(),
+            is_anew,
+        };
         let writing = writer.start();
         if let Err(error) = &writing {
             health.send_replace(Health::Failing(error.to_string()));
@@ -207,9 +215,38 @@ impl Open for Recorder {
             plant.set_past(None);
             plant.set_untold(None);
             drop((listening, tasks));
-            inbox.end();
+            match plant.is_closing() {
+                true => inbox.end(),
+                false => inbox.close(),
+            }
             let joined = tokio::task::spawn_blocking(move || writing.map(JoinHandle::join));
             let _ = tokio::time::timeout(ENDED_WITHIN, joined).await;
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{forecast::Forecast, write::Limits};
+
+    fn config(file: &Path) -> HistoryConfig {
+        HistoryConfig {
+            file: Some(file.to_owned()),
+            limits: Limits::default(),
+            forecast: Forecast::default(),
+            forward: None,
+            maintained: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_history_is_no_other_one_because_a_drive_has_come() {
+        let one = config(Path::new("history.sqlite"));
+        let forecast = Forecast { bytes: 7, bytes_a_day: 1 };
+        assert!(one.is_same(&HistoryConfig { forecast, ..one.clone() }));
+        assert!(!one.is_same(&config(Path::new("other.sqlite"))));
     }
 }

@@ -108,8 +108,14 @@ impl Recorder {
             let steady_ms = now.load(Ordering::SeqCst);
             Moment { steady_ms, wall_ms: begin_ms + steady_ms }
         };
-        let writer =
-            Writer { path: path.to_owned(), limits: Limits::default(), inbox: inbox.clone(), clock, health };
+        let writer = Writer {
+            path: path.to_owned(),
+            limits: Limits::default(),
+            inbox: inbox.clone(),
+            clock,
+            health,
+            is_anew: false,
+        };
         drop(writer.start().unwrap());
         let (tracker, shown) = (Tracker::default(), BTreeMap::new());
         Self { inbox, steady, tracker, begin_ms, health: seen, shown, random: fastrand::Rng::with_seed(7) }

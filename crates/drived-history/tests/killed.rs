@@ -81,7 +81,9 @@ fn worker() {
     let (health, _seen) = watch::channel(Health::Opening);
     let inbox = Inbox::default();
     let _thread =
-        Writer { path, limits: Limits::default(), inbox: inbox.clone(), clock, health }.start().unwrap();
+        Writer { path, limits: Limits::default(), inbox: inbox.clone(), clock, health, is_anew: false }
+            .start()
+            .unwrap();
     let mut tracker = Tracker::default();
     for number in 1_i64.. {
         let now = clock();

@@ -62,7 +62,7 @@ async fn on_a_mount_of_its_own() {
         Moment { steady_ms: at, wall_ms: at }
     };
     let limits = Limits::default();
-    let writer = Writer { path: path.clone(), limits, inbox: inbox.clone(), clock, health };
+    let writer = Writer { path: path.clone(), limits, inbox: inbox.clone(), clock, health, is_anew: false };
     let thread = writer.start().unwrap();
     let patience = Duration::from_secs(60);
     let is_failing = |health: &Health| matches!(health, Health::Failing(_));

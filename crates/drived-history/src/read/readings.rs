@@ -62,7 +62,7 @@ fn turns(connection: &Connection, from: i64, to: i64) -> Result<Vec<Turn>, Store
         "SELECT run, steady_ms, wall_ms, what, body,
             (SELECT wall_ms FROM record AS before WHERE before.id < record.id ORDER BY id DESC LIMIT 1)
          FROM record WHERE wall_ms BETWEEN ?1 AND ?2 AND kind = 'history'
-            AND what IN ('clock_stepped', 'began', 'began_after_kill') ORDER BY id",
+            AND what IN ('clock_stepped', 'began', 'began_after_kill', 'history_opened') ORDER BY id",
     )?;
     let near = [from.min(to).saturating_sub(LONGEST_MS), from.max(to)];
     let rows = find.query_map(near, |row| {

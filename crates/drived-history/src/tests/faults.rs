@@ -17,7 +17,7 @@ use crate::{
     write::{
         Limits,
         age::{self, Lived},
-        archive::Archive,
+        archive::{Archive, End},
         inbox::{Batch, Inbox, Lost, Shown},
         tidy,
         writer::{Health, Writer},
@@ -93,6 +93,36 @@ fn a_run_that_was_killed_is_told_by_the_next_and_one_that_ended_is_not() {
             archive.end_run(&mut store.connection, moment(10)).unwrap();
         }
     }
+}
+
+#[test]
+fn a_history_that_a_reload_opens_anew_is_no_end_of_the_daemon() {
+    let folder = Folder::new("history-anew");
+    let path = folder.file("history.sqlite");
+    let run = |is_anew: bool, end: Option<End>| {
+        let mut store = store::open(&path).unwrap().store;
+        let mut archive = Archive::begin(moment(0));
+        archive.is_anew = is_anew;
+        archive.begin_run(&mut store.connection, "test").unwrap();
+        if let Some(end) = end {
+            archive.end_run_by(end, &mut store.connection, moment(10)).unwrap();
+        }
+    };
+    run(false, Some(End::Closed));
+    run(true, Some(End::Closed));
+    // The program ended, or was killed, while no history was kept: nobody knows which.
+    run(false, None);
+    run(true, Some(End::Ended));
+    let told = all(&store::open(&path).unwrap().store.connection);
+    let told: Vec<(&str, &str)> = told.iter().map(|found| (&*found.what, &*found.text)).collect();
+    let closed = ("history_closed", "the history was closed by a reload; the daemon goes on");
+    let opened = ("history_opened", "the history was opened anew by a reload; the daemon goes on");
+    let silent =
+        (opened.0, "the history was opened anew by a reload; the run before ended in it without a word");
+    let first = ("began", "the history begins: nothing is known of before");
+    let began = ("began", "the daemon began; a reload had closed the history before");
+    let ended = ("ended", "the daemon ended as it should");
+    assert_eq!(told, [first, closed, opened, closed, began, silent, ended]);
 }
 
 #[test]
@@ -383,7 +413,8 @@ fn writer(path: std::path::PathBuf) -> (Inbox, watch::Receiver<Health>, std::thr
     let (health, seen) = watch::channel(Health::Opening);
     let (inbox, began) = (Inbox::default(), std::time::Instant::now());
     let clock = move || moment(i64::try_from(began.elapsed().as_millis()).unwrap());
-    let writer = Writer { path, limits: Limits::default(), inbox: inbox.clone(), clock, health };
+    let writer =
+        Writer { path, limits: Limits::default(), inbox: inbox.clone(), clock, health, is_anew: false };
     (inbox, seen, writer.start().unwrap())
 }
 
@@ -408,6 +439,18 @@ async fn a_folder_that_cannot_be_written_is_told_and_the_writer_goes_on_by_itsel
     thread.join().unwrap();
     let history = History::open(&path).unwrap();
     assert_eq!(words(&history.0), ["began", "tripped", "ended"]);
+}
+
+#[tokio::test]
+async fn a_writer_that_is_closed_by_a_reload_says_that_the_daemon_goes_on() {
+    let folder = Folder::new("history-closed");
+    let path = folder.file("history.sqlite");
+    let (inbox, mut health, thread) = writer(path.clone());
+    becomes(&mut health, |health| *health == Health::Writing).await;
+    inbox.record(event(moment(1), "pump", "tripped"));
+    inbox.close();
+    thread.join().unwrap();
+    assert_eq!(words(&History::open(&path).unwrap().0), ["began", "tripped", "history_closed"]);
 }
 
 #[tokio::test]

@@ -51,6 +51,25 @@ impl Clock {
     }
 }
 
+/// How a run ends in the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// The program ends.
+    Ended,
+    /// A reload closes the history, and the program goes on.
+    Closed,
+}
+
+impl End {
+    /// In one word, and in a sentence.
+    const fn told(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Ended => ("ended", "the daemon ended as it should"),
+            Self::Closed => ("history_closed", "the history was closed by a reload; the daemon goes on"),
+        }
+    }
+}
+
 /// What was shown between two flushes.
 #[derive(Debug)]
 struct Flush {
@@ -80,6 +99,8 @@ pub struct Archive {
     flushed_at: i64,
     lost: Lost,
     lost_since: Option<Moment>,
+    /// Its run is no beginning of the program: a reload has opened the history anew.
+    pub is_anew: bool,
 }
 
 impl Archive {
@@ -103,6 +124,7 @@ impl Archive {
             flushed_at: now.steady_ms,
             lost: Lost::default(),
             lost_since: None,
+            is_anew: false,
         }
     }
 
@@ -249,17 +271,29 @@ impl Archive {
             params![began.wall_ms, program, lived],
         )?;
         let run = transaction.last_insert_rowid();
-        let text = match before {
-            None => "the history begins: nothing is known of before".to_owned(),
-            Some((_, Some(_))) => "the daemon began; the run before had ended as it should".to_owned(),
-            Some((_, None)) => {
-                "the daemon began; the run before ended without a word: it was killed, power was cut, or its end could not be written"
-                    .to_owned()
-            }
+        let was_closed = match before {
+            Some((before, _)) => is_closed(&transaction, before)?,
+            None => false,
         };
-        let what = match before {
-            Some((_, None)) => "began_after_kill",
-            _ => "began",
+        let (what, text) = match (before, self.is_anew) {
+            (None, _) => ("began", "the history begins: nothing is known of before"),
+            (Some((_, Some(_))), true) => {
+                ("history_opened", "the history was opened anew by a reload; the daemon goes on")
+            }
+            (Some((_, None)), true) => (
+                "history_opened",
+                "the history was opened anew by a reload; the run before ended in it without a word",
+            ),
+            (Some((_, Some(_))), false) if was_closed => {
+                ("began", "the daemon began; a reload had closed the history before")
+            }
+            (Some((_, Some(_))), false) => {
+                ("began", "the daemon began; the run before had ended as it should")
+            }
+            (Some((_, None)), false) => (
+                "began_after_kill",
+                "the daemon began; the run before ended without a word: it was killed, power was cut, or its end could not be written",
+            ),
         };
         let mut began_record = Record::of_history(began, what, text);
         if let Some((_, None)) = before {
@@ -355,9 +389,23 @@ impl Archive {
     /// # Errors
     /// It cannot be written.
     pub fn end_run(&mut self, connection: &mut Connection, now: Moment) -> Result<(), StoreError> {
+        self.end_run_by(End::Ended, connection, now)
+    }
+
+    /// The same, by whichever end.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn end_run_by(
+        &mut self,
+        end: End,
+        connection: &mut Connection,
+        now: Moment,
+    ) -> Result<(), StoreError> {
         self.close(now);
         self.outages_at_once = true;
-        self.record(Record::of_history(now, "ended", "the daemon ended as it should"));
+        let (what, text) = end.told();
+        self.record(Record::of_history(now, what, text));
         self.write_values(connection)?;
         self.write_records(connection, now)?;
         if let Some(run) = self.run {
@@ -391,6 +439,14 @@ fn hole(lost: Lost, since: Moment, now: Moment) -> Record {
         "values": values, "records": records, "since_unix_ms": since.wall_ms, "until_unix_ms": now.wall_ms,
     });
     Record { body: Some(body.to_string()), is_alarm: true, ..Record::of_history(now, "hole", text) }
+}
+
+/// Whether a run ended by a reload that closed the history.
+fn is_closed(transaction: &Transaction<'_>, run: i64) -> rusqlite::Result<bool> {
+    let last: Option<String> = transaction
+        .query_row("SELECT what FROM record WHERE run = ?1 ORDER BY id DESC LIMIT 1", [run], |row| row.get(0))
+        .optional()?;
+    Ok(last.as_deref() == Some(End::Closed.told().0))
 }
 
 /// The last moment of which the file knows something.

@@ -54,6 +54,8 @@ pub struct Batch {
     /// How often somebody has asked for what waits to be written, since the beginning.
     pub asked: u64,
     pub is_end: bool,
+    /// It ends by a reload, and the program does not.
+    pub goes_on: bool,
 }
 
 /// How much could not be taken.
@@ -226,6 +228,12 @@ impl Inbox {
         self.0.rings.notify_one();
     }
 
+    /// Nothing comes any more by this way, and the program goes on: a reload closes the history, or opens it anew.
+    pub fn close(&self) {
+        self.lock().goes_on = true;
+        self.end();
+    }
+
     /// What has come, after `patience` or as soon as a record is there.
     #[must_use]
     pub fn take(&self, patience: Duration) -> Batch {
@@ -233,8 +241,8 @@ impl Inbox {
             |waiting: &mut Batch| waiting.records.is_empty() && waiting.damaged.is_none() && !waiting.is_end;
         let waited = self.0.rings.wait_timeout_while(self.lock(), patience, is_quiet);
         let (mut waiting, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        let (is_end, asked) = (waiting.is_end, waiting.asked);
-        std::mem::replace(&mut *waiting, Batch { is_end, asked, ..Batch::default() })
+        let Batch { is_end, goes_on, asked, .. } = *waiting;
+        std::mem::replace(&mut *waiting, Batch { is_end, goes_on, asked, ..Batch::default() })
     }
 
     /// Lets what comes wait together for this long, unless nothing comes any more.

@@ -10,7 +10,7 @@ use tokio::sync::watch;
 
 use super::{
     Limits,
-    archive::{Archive, FLUSHED_EVERY_MS},
+    archive::{Archive, End, FLUSHED_EVERY_MS},
     frames,
     inbox::Inbox,
     tidy,
@@ -48,6 +48,8 @@ pub struct Writer<C> {
     /// Both clocks.
     pub clock: C,
     pub health: watch::Sender<Health>,
+    /// This program has kept a history before: a reload opens it anew.
+    pub is_anew: bool,
 }
 
 impl<C: Fn() -> Moment + Send + 'static> Writer<C> {
@@ -77,7 +79,8 @@ struct Work<C> {
 
 impl<C: Fn() -> Moment> Work<C> {
     fn new(writer: Writer<C>) -> Self {
-        let archive = Archive::begin((writer.clock)());
+        let mut archive = Archive::begin((writer.clock)());
+        archive.is_anew = writer.is_anew;
         Self {
             writer,
             archive,
@@ -96,7 +99,8 @@ impl<C: Fn() -> Moment> Work<C> {
             let began = Instant::now();
             let mut batch = self.writer.inbox.take(LOOK);
             self.damaged = batch.damaged.take().or_else(|| self.damaged.take());
-            let (now, is_end, asked) = ((self.writer.clock)(), batch.is_end, batch.asked);
+            let (now, asked) = ((self.writer.clock)(), batch.asked);
+            let (is_end, goes_on) = (batch.is_end, batch.goes_on);
             self.archive.take(batch, now);
             self.archive.look_at_clock(now);
             let is_asked = asked != self.asked && now.steady_ms - self.asked_at >= ASKED_EVERY_MS;
@@ -107,7 +111,8 @@ impl<C: Fn() -> Moment> Work<C> {
             }
             let may_try = self.tried.is_none_or(|tried| tried.elapsed() >= TRIED_AGAIN) || is_end;
             if may_try && !self.is_given_up {
-                let worked = self.work(now, is_end);
+                let end = is_end.then_some(if goes_on { End::Closed } else { End::Ended });
+                let worked = self.work(now, end);
                 if worked.is_ok() {
                     self.writer.inbox.has_written_until(self.archive.flushed_at());
                 }
@@ -125,7 +130,7 @@ impl<C: Fn() -> Moment> Work<C> {
         }
     }
 
-    fn work(&mut self, now: Moment, is_end: bool) -> Result<(), StoreError> {
+    fn work(&mut self, now: Moment, end: Option<End>) -> Result<(), StoreError> {
         let mut store = match self.store.take() {
             Some(store) => store,
             None => self.open(now)?,
@@ -133,7 +138,7 @@ impl<C: Fn() -> Moment> Work<C> {
         // What stands where nothing is written is found by whoever reads. The last words are written all the same.
         if let Some((file, why)) = self.damaged.take()
             && file == self.writer.inbox.file()
-            && !is_end
+            && end.is_none()
         {
             drop(store);
             return Err(self.put_aside(&why, now));
@@ -144,8 +149,8 @@ impl<C: Fn() -> Moment> Work<C> {
                 self.archive.write_records(connection, now)?;
             }
             self.archive.write_values(connection)?;
-            if is_end {
-                return self.archive.end_run(connection, now);
+            if let Some(end) = end {
+                return self.archive.end_run_by(end, connection, now);
             }
             let began = Instant::now();
             while self.has_to_tidy && began.elapsed() < TIDIED {

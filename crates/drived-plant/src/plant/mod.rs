@@ -98,6 +98,7 @@ struct Inner {
     alarms: alarms::Desk,
     names: OnceLock<Names>,
     past: RwLock<Option<Arc<dyn past::Past>>>,
+    has_kept_past: AtomicBool,
     untold: RwLock<Option<Arc<dyn untold::Untold>>>,
     watched: Watched,
 }
@@ -145,6 +146,7 @@ impl Plant {
             alarms: alarms::Desk::new(kept),
             names: OnceLock::new(),
             past: RwLock::default(),
+            has_kept_past: AtomicBool::new(false),
             untold: RwLock::default(),
             watched,
         });

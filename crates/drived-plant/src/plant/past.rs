@@ -549,7 +549,13 @@ pub struct StoryView {
 impl Plant {
     /// This keeps the past from now on; `None`: nobody does.
     pub fn set_past(&self, past: Option<Arc<dyn Past>>) {
+        self.0.has_kept_past.fetch_or(past.is_some(), Ordering::Relaxed);
         *self.0.past.write().unwrap_or_else(PoisonError::into_inner) = past;
+    }
+
+    /// Whether somebody keeps the past, or has since the program began.
+    pub fn has_kept_past(&self) -> bool {
+        self.0.has_kept_past.load(Ordering::Relaxed)
     }
 
     /// Gives what was read of a setting to whoever keeps the past.

@@ -64,7 +64,7 @@ impl Facts {
         if self.is_cut {
             return Some("more is recorded than was looked at".to_owned());
         }
-        let (mut ended, mut last) = (None, None);
+        let (mut ended, mut closed, mut last) = (None, None, None);
         for found in self.records.iter().filter(|found| found.kind == "history") {
             let (at, body) = (found.time_unix_ms, body(found));
             let (since, why) = match &*found.what {
@@ -72,8 +72,21 @@ impl Facts {
                     ended = Some(at);
                     continue;
                 }
+                "history_closed" => {
+                    closed = Some(at);
+                    continue;
+                }
+                // What happened in the moment of a reload is told by the next one.
+                "history_opened" if closed.is_none_or(|closed| at - closed < TOLD_AGAIN_MS) => {
+                    closed = None;
+                    continue;
+                }
+                "history_opened" => (closed.take().unwrap_or(at), "the history had been closed"),
                 "began_after_kill" => {
                     (body.last_known_unix_ms.unwrap_or(i64::MIN), "this program had been killed")
+                }
+                "began" if closed.is_some() => {
+                    (closed.take().unwrap_or(i64::MIN), "the history had been closed")
                 }
                 "began" => (ended.unwrap_or(i64::MIN), "this program had not run until then"),
                 "hole" if body.records != Some(0) => {
@@ -87,6 +100,9 @@ impl Facts {
             if since <= to && at >= from {
                 last = Some(why);
             }
+        }
+        if closed.is_some_and(|closed| closed <= to) {
+            return Some("the history had been closed".to_owned());
         }
         match ended {
             Some(ended) if ended <= to && !self.began_after(ended) => {

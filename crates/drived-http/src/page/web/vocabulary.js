@@ -157,6 +157,8 @@ const WORDS = {
   began: ['Daemon begins', 'Début du service'],
   began_after_kill: ['Daemon begins, was killed', 'Début du service, qui avait été tué'],
   ended: ['Daemon ends', 'Fin du service'],
+  history_closed: ['History closed', 'Historique fermé'],
+  history_opened: ['History opened anew', 'Historique rouvert'],
   hole: ['Not recorded', 'Non enregistré'],
   stream_anew: ['Read anew', 'Relu'],
 };
