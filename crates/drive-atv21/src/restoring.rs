@@ -37,5 +37,6 @@ pub(crate) const RESTORING: Restoring = Restoring {
     ],
     left: &[],
     relations: &[],
+    limits: &[],
     control: &[REFERENCE_MODE, COMMAND_MODE],
 };

@@ -1,9 +1,14 @@
 //! What a backup keeps of an Altivar 28 and in which order a restore writes it: the rules of the twins on the Altivar 312
 //! (BBV51701), as far as the Altivar 28 has the registers.
 
-use drive_core::registers::{Holds, Relation, Restoring, Step};
+use drive_core::registers::{Allows, Holds, Limit, Relation, Restoring, Step};
 
 use crate::registers::address::*;
+
+/// A share of the nominal drive current.
+const fn of_nominal(registers: &'static [u16], least: i32, most: i32, why: &'static str) -> Limit {
+    Limit { registers, by: INV, allows: Allows::Percent(least, most), why }
+}
 
 /// See [`Restoring`].
 pub(crate) const RESTORING: Restoring = Restoring {
@@ -31,5 +36,10 @@ pub(crate) const RESTORING: Restoring = Restoring {
         registers: &[LSP, HSP, TFR],
         why: "LSP ≤ HSP ≤ tFr on the twin (BBV51701 p. 27)",
     }],
+    limits: &[
+        of_nominal(&[ITH], 20, 150, "0.2 to 1.5 In on the twin (BBV51701 p. 27)"),
+        of_nominal(&[CTD], 0, 150, "0 to 1.5 In on the twin (BBV51701 p. 28)"),
+        of_nominal(&[IDC], 0, 100, "0 to In on the twin (BBV51701 p. 40)"),
+    ],
     ..Restoring::NONE
 };

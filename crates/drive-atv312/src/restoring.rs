@@ -1,13 +1,52 @@
 //! What a backup keeps of an Altivar 312 and in which order a restore writes it: the interlocks and side effects that
 //! BBV51701 prints beside its variables.
 
-use drive_core::registers::{Holds, Relation, Restoring, Scaled, Step, Unit};
+use drive_core::registers::{Allows, Holds, Limit, Relation, Restoring, Scaled, Step, Unit};
 
 use crate::registers::address::*;
+
+/// LI1 to LI6.
+const INPUTS: [u16; 6] = [129, 130, 131, 132, 133, 134];
+/// Cd11 to Cd15.
+const BITS: [u16; 5] = [171, 172, 173, 174, 175];
+const INPUTS_AND_BITS: [u16; 11] = [129, 130, 131, 132, 133, 134, 171, 172, 173, 174, 175];
+/// LAC = L2 and L3.
+const FROM_LEVEL_2: &[u16] = &[1, 2];
+/// LAC = L3.
+const LEVEL_3: &[u16] = &[2];
+/// EtF by a bit, and LEt = LO, would trip (p. 52).
+const HIG: &[u16] = &[1];
+/// UnS in V over FrS in Hz, for VCAL = M2, M3, N4 and S6 (p. 26, 29).
+const VOLTS_PER_HERTZ: &[(u16, i32)] = &[(1, 7), (2, 7), (3, 14), (4, 17)];
+
+/// A share of the nominal drive current.
+const fn of_nominal(registers: &'static [u16], least: i32, most: i32, why: &'static str) -> Limit {
+    Limit { registers, by: INV, allows: Allows::Percent(least, most), why }
+}
+
+/// Words that a level does not have.
+const fn from_level(
+    registers: &'static [u16],
+    words: &'static [u16],
+    levels: &'static [u16],
+    why: &'static str,
+) -> Limit {
+    Limit { registers, by: LAC, allows: Allows::Words(words, levels), why }
+}
 
 const PLATE: &str = "a rating of the motor takes back an auto-tuning: after the settings (BBV51701 p. 30)";
 const COMMAND: &str =
     "who commands goes last: a run input that is closed may start the motor (BBV51701 p. 36, 37)";
+
+/// An output of `IOLR`.
+const fn free_output(bit: u16, function: u16) -> Limit {
+    Limit {
+        registers: &[IOLR],
+        by: function,
+        allows: Allows::BitsOfUnassigned(bit),
+        why: "an output is written only while no function has it (BBV51701 p. 20)",
+    }
+}
 
 /// See [`Restoring`].
 pub(crate) const RESTORING: Restoring = Restoring {
@@ -93,6 +132,94 @@ pub(crate) const RESTORING: Restoring = Restoring {
             holds: Holds::NotWithoutNext,
             registers: &[PR4, PR2],
             why: "Pr4 needs Pr2 (BBV51701 p. 46)",
+        },
+        Relation {
+            holds: Holds::NotAbove,
+            registers: &[SMIL, SMAL],
+            why: "SMIL, which is LSP, ≤ SMAL, which is HSP (BBV51701 p. 18)",
+        },
+        Relation {
+            holds: Holds::RatioAtMost(VOLTS_PER_HERTZ),
+            registers: &[UNS, FRS, VCAL],
+            why: "UnS/FrS of at most 7 V/Hz for M2 and M3, 14 for N4, 17 for S6 (BBV51701 p. 29)",
+        },
+        Relation {
+            holds: Holds::RatioAtMost(VOLTS_PER_HERTZ),
+            registers: &[UNS2, FRS2, VCAL],
+            why: "UnS2/FrS2 of at most 7 V/Hz for M2 and M3, 14 for N4, 17 for S6 (BBV51701 p. 49)",
+        },
+        Relation {
+            holds: Holds::WordsOnlyWith(&BITS, HIG),
+            registers: &[ETF, LET],
+            why: "EtF by a bit of CMD needs LEt = HIG: with LO it is an external fault, which only switching off ends (BBV51701 p. 52)",
+        },
+    ],
+    limits: &[
+        of_nominal(&[ITH], 20, 150, "0.2 to 1.5 In (BBV51701 p. 27)"),
+        of_nominal(&[CLI, CL2, NCR, NCR2], 25, 150, "0.25 to 1.5 In (BBV51701 p. 28, 29, 48, 49)"),
+        of_nominal(&[CTD], 0, 150, "0 to 1.5 In (BBV51701 p. 28)"),
+        of_nominal(&[IDC], 0, 100, "0 to In (BBV51701 p. 40)"),
+        of_nominal(&[SDC1, SDC2], 0, 120, "0 to 1.2 In (BBV51701 p. 41)"),
+        of_nominal(&[IBR], 0, 136, "0 to 1.36 In (BBV51701 p. 47)"),
+        Limit {
+            registers: &[UNS, UNS2],
+            by: VCAL,
+            allows: Allows::Between(&[(1, 100, 240), (2, 100, 240), (3, 100, 500), (4, 100, 600)]),
+            why: "the voltage of the drive (BBV51701 p. 28, 49)",
+        },
+        Limit {
+            registers: &[ACC, DEC, AC2, DE2],
+            by: INR,
+            allows: Allows::Between(&[(0, 5, 32_760), (1, 1, 32_760), (2, 1, 32_760)]),
+            why: "the range of Inr (BBV51701 p. 38)",
+        },
+        from_level(&[FR1, FR2], &[160, 161], FROM_LEVEL_2, "+/- speed from LAC = L2 on (BBV51701 p. 35, 36)"),
+        from_level(
+            &[FR1, FR2, SA2, SA3],
+            &[163, 164, 167],
+            LEVEL_3,
+            "LCC, Mdb and nEt with LAC = L3 (BBV51701 p. 35, 36, 42)",
+        ),
+        from_level(
+            &[RFC],
+            &[187, 188, 189, 190, 191, 203, 205, 206, 207],
+            LEVEL_3,
+            "a bit of CMD with LAC = L3 (BBV51701 p. 36)",
+        ),
+        from_level(
+            &[RPS, FST, DCI, PS2, PS4, PS8, PS16, PR2, PR4, LC2, CHP, ETF],
+            &BITS,
+            LEVEL_3,
+            "a bit of CMD with LAC = L3 (BBV51701 p. 39 to 52)",
+        ),
+        from_level(&[USP, DSP], &INPUTS, FROM_LEVEL_2, "+/- speed from LAC = L2 on (BBV51701 p. 35, 45)"),
+        from_level(&[BLC], &[2, 64], FROM_LEVEL_2, "brake control from LAC = L2 on (BBV51701 p. 35, 47)"),
+        from_level(
+            &[LC2],
+            &INPUTS_AND_BITS,
+            FROM_LEVEL_2,
+            "a second current limit from LAC = L2 on (BBV51701 p. 35, 48)",
+        ),
+        from_level(
+            &[CHP],
+            &INPUTS_AND_BITS,
+            FROM_LEVEL_2,
+            "a second motor from LAC = L2 on (BBV51701 p. 35, 48)",
+        ),
+        from_level(
+            &[LAF, LAR],
+            &INPUTS,
+            FROM_LEVEL_2,
+            "limit switches from LAC = L2 on (BBV51701 p. 35, 50)",
+        ),
+        free_output(1 << 8, R1),
+        free_output(1 << 9, R2),
+        free_output(1 << 10, DO),
+        Limit {
+            registers: &[AO1R],
+            by: DO,
+            allows: Allows::Unassigned,
+            why: "it is written only while dO is not assigned (BBV51701 p. 20)",
         },
     ],
     control: &[CHCF, CD2, CD1, CCS, COP],

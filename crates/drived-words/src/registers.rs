@@ -129,6 +129,7 @@ pub fn range(row: &Row) -> String {
         Range::OneOf(_) => listed(),
         Range::OneOfOr(_, low, high) => format!("{}, or {}", listed(), span(low, high)),
         Range::Described(_, _, rule) => rule.to_owned(),
+        Range::Bits(bits) => format!("bits of {bits:04X}h, the others are reserved or can only be read"),
     }
 }
 

@@ -4,10 +4,13 @@ use std::collections::BTreeMap;
 
 use drive_core::{
     Capabilities, Row,
-    registers::{Change, Place, Relation, Restoring, Space},
+    registers::{Change, Exceeded, Limit, Place, Relation, Restoring, Space},
 };
 
-use crate::registers::brief;
+use crate::{
+    output,
+    registers::{brief, range},
+};
 
 /// The words of a drive between two writes.
 #[derive(Debug, Clone)]
@@ -42,20 +45,31 @@ impl Way {
         brief(&self.capabilities.in_units(row, |address| self.word(address)), word)
     }
 
-    /// The registers that have a relation to one of these, themselves left out.
+    /// The registers that have a relation to one of these or limit it, themselves left out.
     pub fn related(&self, addresses: &[u16]) -> Vec<&'static Row> {
-        let relations = self.capabilities.restoring.relations.iter();
-        let relations = relations
-            .filter(|relation| relation.registers.iter().any(|register| addresses.contains(register)));
-        let registers: Vec<u16> = relations.flat_map(|relation| relation.registers).copied().collect();
+        let registers = self.concerned(addresses);
         let is_other = |row: &&Row| registers.contains(&row.address) && !addresses.contains(&row.address);
         self.capabilities.rows.iter().filter(is_other).collect()
     }
 
-    /// What does not hold any more, in words, when a word is written, and did before; `None` where nothing is broken by it.
+    /// All that have to do with one of these: what they have a relation to, and what limits them.
+    fn concerned(&self, addresses: &[u16]) -> Vec<u16> {
+        let is_ours = |registers: &[u16]| registers.iter().any(|register| addresses.contains(register));
+        let Restoring { relations, limits, .. } = self.capabilities.restoring;
+        let relations = relations.iter().filter(|relation| is_ours(relation.registers));
+        let limits = limits.iter().filter(|limit| is_ours(limit.registers));
+        let related = relations.flat_map(|relation| relation.registers).copied();
+        related.chain(limits.map(|limit| limit.by)).collect()
+    }
+
+    /// What does not hold any more, in words, when a word is written, and did before, or what limits it; `None` where nothing is
+    /// broken by it.
     pub fn would_break(&self, Change { row, wanted, .. }: &Change) -> Option<String> {
         let mut then = self.clone();
         then.hold(row.place(), *wanted);
+        if let Some(why) = then.exceeds(row) {
+            return Some(why);
+        }
         let relations = self.capabilities.restoring.relations.iter();
         let mut concerned = relations.filter(|relation| relation.registers.contains(&row.address));
         concerned.find_map(|relation| {
@@ -68,10 +82,7 @@ impl Way {
     pub fn judged_by(&self, writes: &[(&'static Row, u16)]) -> Vec<&'static Row> {
         let rows = || writes.iter().map(|(row, _)| *row).filter(|row| row.space == Space::HoldingRegister);
         let addresses: Vec<u16> = rows().map(|row| row.address).collect();
-        let relations = self.capabilities.restoring.relations.iter();
-        let concerned = relations
-            .filter(|relation| relation.registers.iter().any(|register| addresses.contains(register)));
-        let registers: Vec<u16> = concerned.flat_map(|relation| relation.registers).copied().collect();
+        let registers = self.concerned(&addresses);
         let is_one = |row: &&Row| {
             row.space == Space::HoldingRegister
                 && registers.contains(&row.address)
@@ -80,11 +91,18 @@ impl Way {
         self.capabilities.rows.iter().filter(is_one).collect()
     }
 
-    /// Why these words are not written, one after the other, to a drive that holds this: one of them would leave it with what its
-    /// manual forbids. What is not known forbids nothing.
+    /// Why these words are not written, one after the other, to a drive that holds this: one of them is outside its range, or would
+    /// leave it with what its manual forbids. What is not known forbids nothing.
     pub fn refuses(&self, writes: &[(&'static Row, u16)]) -> Option<String> {
         let mut way = self.clone();
         writes.iter().find_map(|&(row, wanted)| {
+            if !row.range.allows(row.unit.number(wanted)) {
+                let (text, expected) = (way.text(row, wanted), range(row));
+                let code = row.code;
+                return Some(format!(
+                    "{code} {text} is not allowed, expected: {expected}; nothing was written"
+                ));
+            }
             let held = way.word(row.place()).unwrap_or(wanted);
             let why = way.would_break(&Change { row, held, wanted }).map(|why| {
                 let text = way.text(row, wanted);
@@ -112,6 +130,26 @@ impl Way {
 
     fn broken(&self, relation: &Relation) -> Option<Vec<&'static Row>> {
         relation.broken(self.capabilities.rows, &|address| self.word(address))
+    }
+
+    /// Which limit a register does not keep with what it holds here, in words.
+    pub fn exceeds(&self, row: &Row) -> Option<String> {
+        let word = self.word(row.place()).filter(|_| row.space == Space::HoldingRegister)?;
+        let limits = self.capabilities.restoring.limits.iter();
+        let mut limits = limits.filter(|limit: &&Limit| limit.registers.contains(&row.address));
+        let Exceeded { limit, by, held, span } = limits.find_map(|limit| {
+            limit.exceeded(self.capabilities.rows, (row, word), &|address| self.word(address))
+        })?;
+        let unit = self.capabilities.in_units(row, |address| self.word(address)).unit;
+        let span = span.map(|(low, high)| {
+            format!(", here {} to {}", output::in_unit(unit, low), output::in_unit(unit, high))
+        });
+        let (code, text, by_code, by_text) = (row.code, self.text(row, word), by.code, self.text(by, held));
+        Some(format!(
+            "{code} {text} with {by_code} {by_text} against {}{}",
+            limit.why,
+            span.unwrap_or_default()
+        ))
     }
 
     fn in_words(&self, relation: &Relation, broken: &[&'static Row]) -> String {

@@ -15,6 +15,8 @@ const HZ: registers::Unit = registers::Unit::scaled("Hz", 1);
 const AMPERE: registers::Unit = registers::Unit::scaled("A", 1);
 const PERCENT: registers::Unit = registers::Unit::scaled("%", 0);
 const RPM: registers::Unit = registers::Unit::scaled("rpm", 0);
+/// The high word of a 32-bit speed: SPAL and SPDL end at 65535 rpm, SMIL and SMAL at the speeds of 500 Hz, so it is 0 (p. 18, 27).
+const HIGH: registers::Unit = registers::Unit::scaled("× 65536 rpm", 0);
 const SECOND: registers::Unit = registers::Unit::scaled("s", 1);
 /// The manual prints 0.1 s, which is the factory's `Inr` (p. 38, 39); a count is whatever `Inr` says.
 const RAMP: registers::Unit = registers::Unit::scaled("× Inr", 0);
@@ -31,22 +33,24 @@ registers! {
     RFRD: Read(8604, "RFRD", "output speed (signed value); with CMI bit 9: 32767 for 600 Hz", Volatile, RPM.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 17");
     ERRD: Read(8606, "ERRD", "fault code", Volatile, Unit::BITS, Range::OneOf(CIA_402_ERRORS), Factory::None, Elsewhere, "BBV51701 p. 17");
     SMIL: ReadWrite(8607, "SMIL", "min. speed", RamUntilSaved, RPM, Range::Described(0, 65_535, "0 to HSP in rpm"), Factory::None, Elsewhere, "BBV51701 p. 18");
-    SMIL_HIGH: ReadWrite(8608, "SMIL high", "min. speed, high word", RamUntilSaved, RPM, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 18");
+    SMIL_HIGH: ReadWrite(8608, "SMIL high", "min. speed, high word", RamUntilSaved, HIGH, Range::Within(0, 0), Factory::None, Elsewhere, "BBV51701 p. 18");
     SMAL: ReadWrite(8609, "SMAL", "max. speed", RamUntilSaved, RPM, Range::Described(0, 65_535, "LSP to tFr in rpm"), Factory::None, Elsewhere, "BBV51701 p. 18");
-    SMAL_HIGH: ReadWrite(8610, "SMAL high", "max. speed, high word", RamUntilSaved, RPM, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 18");
-    SPAL: ReadWrite(8611, "SPAL", "acceleration, speed delta", RamUntilSaved, RPM, Range::Described(0, 65_535, "1 to 65535 with the high word"), Factory::None, Elsewhere, "BBV51701 p. 18");
-    SPAL_HIGH: ReadWrite(8612, "SPAL high", "acceleration, speed delta, high word", RamUntilSaved, RPM, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 18");
+    SMAL_HIGH: ReadWrite(8610, "SMAL high", "max. speed, high word", RamUntilSaved, HIGH, Range::Within(0, 0), Factory::None, Elsewhere, "BBV51701 p. 18");
+    SPAL: ReadWrite(8611, "SPAL", "acceleration, speed delta", RamUntilSaved, RPM, Range::Within(1, 65_535), Factory::None, Elsewhere, "BBV51701 p. 18");
+    SPAL_HIGH: ReadWrite(8612, "SPAL high", "acceleration, speed delta, high word", RamUntilSaved, HIGH, Range::Within(0, 0), Factory::None, Elsewhere, "BBV51701 p. 18");
     SPAT: ReadWrite(8613, "SPAT", "acceleration, time delta", RamUntilSaved, Unit::scaled("s", 0), Range::Within(0, 65_535), Factory::None, Elsewhere, "BBV51701 p. 18");
-    SPDL: ReadWrite(8614, "SPDL", "deceleration, speed delta", RamUntilSaved, RPM, Range::Described(0, 65_535, "1 to 65535 with the high word"), Factory::None, Elsewhere, "BBV51701 p. 18");
-    SPDL_HIGH: ReadWrite(8615, "SPDL high", "deceleration, speed delta, high word", RamUntilSaved, RPM, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 18");
+    SPDL: ReadWrite(8614, "SPDL", "deceleration, speed delta", RamUntilSaved, RPM, Range::Within(1, 65_535), Factory::None, Elsewhere, "BBV51701 p. 18");
+    SPDL_HIGH: ReadWrite(8615, "SPDL high", "deceleration, speed delta, high word", RamUntilSaved, HIGH, Range::Within(0, 0), Factory::None, Elsewhere, "BBV51701 p. 18");
     SPDT: ReadWrite(8616, "SPDT", "deceleration, time delta", RamUntilSaved, Unit::scaled("s", 0), Range::Within(0, 65_535), Factory::None, Elsewhere, "BBV51701 p. 18");
 
     // Control variables (p. 19–20).
     CMD: ReadWrite(8501, "CMD", "control word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 19");
     LFR: ReadWrite(8502, "LFr", "frequency reference via the bus (signed value); with CMI bit 9: 32767 for 600 Hz", Volatile, HZ.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 19");
     PISP: ReadWrite(8503, "PISP", "PI regulator reference via the bus", Volatile, Unit::scaled("%", 1), Range::Within(0, 1000), Factory::None, Elsewhere, "BBV51701 p. 19");
-    CMI: ReadWrite(8504, "CMI", "extended control word", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 20");
-    IOLR: ReadWrite(5240, "IOLR", "value of logic I/O", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 20 and 23");
+    // Bits 2, 5 to 8 and 10 to 12 are reserved, and never to be written (p. 7, 20).
+    CMI: ReadWrite(8504, "CMI", "extended control word", Volatile, Unit::BITS, Range::Bits(0xE21B), Factory::None, Elsewhere, "BBV51701 p. 20");
+    // The inputs and bit 14 are only read, bits 11 to 13 and 15 reserved (p. 20).
+    IOLR: ReadWrite(5240, "IOLR", "value of logic I/O", Volatile, Unit::BITS, Range::Bits(0x0700), Factory::None, Elsewhere, "BBV51701 p. 20 and 23");
     AO1R: ReadWrite(5261, "AO1R", "value of the analog output", Volatile, Unit::COUNT, Range::Within(0, 10_000), Factory::None, Elsewhere, "BBV51701 p. 20 and 23");
 
     // Monitoring variables (p. 21–26).

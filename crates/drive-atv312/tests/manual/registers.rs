@@ -162,10 +162,7 @@ fn each_row_takes_the_range_and_the_values_that_are_printed_and_no_others() {
         let bounds = bounds.and_then(|(from, to)| Some((from.parse::<i32>().ok()?, to.parse::<i32>().ok()?)));
         match (bounds, row.range) {
             (Some(printed), Range::Within(from, to) | Range::Described(from, to, _)) => {
-                // The words of a 32-bit value take any half of it.
-                if !["SPAL", "SPDL"].contains(&code) {
-                    assert_eq!((from, to), printed, "{code}");
-                }
+                assert_eq!((from, to), printed, "{code}");
             }
             (Some(printed), range) => panic!("{code}: {printed:?} and {range:?}"),
             (None, Range::Within(..)) => panic!("{code}: {}", line.range),

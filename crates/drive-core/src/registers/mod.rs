@@ -50,6 +50,7 @@
 //! ```
 
 mod guard;
+mod limits;
 mod relations;
 mod restoring;
 mod row;
@@ -60,6 +61,7 @@ use std::{fmt, marker::PhantomData};
 
 pub use crate::access::{self, Access};
 pub use guard::refuse_commands;
+pub use limits::{Allows, Exceeded, Limit};
 pub use relations::{Holds, Relation};
 pub use restoring::{Change, Part, Restoring, Scaled, Step, in_order};
 pub use row::{Choice, Confidence, Factory, Range, Row, Storage, Written};

@@ -24,6 +24,10 @@ pub enum Holds {
     NotWithoutNext,
     /// No two hold the same.
     Distinct,
+    /// The first, in its unit, is at most so many times the second, in its unit: so many for each word of the third.
+    RatioAtMost(&'static [(u16, i32)]),
+    /// The first holds one of the first words only while the second holds one of the others.
+    WordsOnlyWith(&'static [u16], &'static [u16]),
 }
 
 /// A register and its word.
@@ -57,6 +61,17 @@ impl Relation {
             Holds::SumAtMost(most) => {
                 let sum: i64 = known.iter().filter_map(number).sum();
                 (sum > i64::from(most)).then(|| known.iter().map(|(row, _)| *row).collect())
+            }
+            Holds::RatioAtMost(most) => {
+                let [one, two, by] = &*known else { return None };
+                let (_, most) = most.iter().find(|(word, _)| *word == by.1)?;
+                let step = |(row, _): &Held| 10_i64.pow(u32::from(row.unit.decimals));
+                let (above, below) = (number(one)? * step(two), number(two)? * step(one));
+                (below > 0 && above > i64::from(*most) * below).then(|| vec![one.0, two.0])
+            }
+            Holds::WordsOnlyWith(words, others) => {
+                let [one, other] = &*known else { return None };
+                (words.contains(&one.1) && !others.contains(&other.1)).then(|| vec![one.0, other.0])
             }
             Holds::Distinct => known.iter().enumerate().find_map(|(index, (row, word))| {
                 let (other, _) = known.iter().skip(index + 1).find(|(_, other)| other == word)?;
@@ -97,6 +112,23 @@ mod tests {
         assert_eq!(limits([Some(0), Some(600), None]), None);
         // The unit is signed: FFFFh is -1.
         assert_eq!(limits([None, Some(0), Some(65_535)]), Some(vec!["LSP", "HSP"]));
+    }
+
+    #[test]
+    fn a_ratio_is_judged_by_the_word_that_chooses_it_and_a_word_by_the_one_it_needs() {
+        // bEn and LSP count 0.1, so the ratio is that of the counts; HSP chooses.
+        let ratio = |held| broken(Holds::RatioAtMost(&[(1, 7), (3, 14)]), held);
+        assert_eq!(ratio([Some(140), Some(10), Some(3)]), None);
+        assert_eq!(ratio([Some(141), Some(10), Some(3)]), Some(vec!["bEn", "LSP"]));
+        assert_eq!(ratio([Some(141), Some(10), Some(1)]), Some(vec!["bEn", "LSP"]));
+        for unknown in
+            [[Some(141), Some(10), Some(0)], [Some(141), Some(10), None], [Some(1), Some(0), Some(3)]]
+        {
+            assert_eq!(ratio(unknown), None);
+        }
+        let needs = |held| broken(Holds::WordsOnlyWith(&[171], &[1]), held);
+        assert_eq!(needs([Some(171), Some(0), None]), Some(vec!["bEn", "LSP"]));
+        assert_eq!([needs([Some(171), Some(1), None]), needs([Some(129), Some(0), None])], [None, None]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What of a drive's registers a backup keeps, and the order in which a restore writes it: as data, from the manuals.
 
 use super::{
+    limits::Limit,
     relations::Relation,
     row::{Row, Storage},
     unit::Unit,
@@ -49,6 +50,8 @@ pub struct Restoring {
     pub left: &'static [(&'static [u16], &'static str)],
     /// What has to hold among values at every moment of the way.
     pub relations: &'static [Relation],
+    /// Which values registers take by what others hold, judged whenever one of them is written.
+    pub limits: &'static [Limit],
     /// Registers that say who commands: written last, and not at all behind a setting that was refused, for that one may be what
     /// keeps the motor of whoever commands then within its limits.
     pub control: &'static [u16],
@@ -87,6 +90,7 @@ impl Restoring {
         acts_later: &[],
         left: &[],
         relations: &[],
+        limits: &[],
         control: &[],
     };
 

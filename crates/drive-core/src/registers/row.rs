@@ -83,6 +83,8 @@ pub enum Range {
     /// From and to in counts as far as they are fixed, and the rest of the rule in words ("LSP to tFr"): the drive
     /// itself judges.
     Described(i32, i32, &'static str),
+    /// Any of these bits: the others are reserved, or can only be read.
+    Bits(u16),
 }
 
 impl Range {
@@ -95,6 +97,7 @@ impl Range {
             Self::Within(min, max) | Self::Described(min, max, _) => (min..=max).contains(&number),
             Self::OneOf(choices) => listed(choices),
             Self::OneOfOr(choices, min, max) => listed(choices) || (min..=max).contains(&number),
+            Self::Bits(bits) => number & !i32::from(bits) == 0,
         }
     }
 
@@ -103,7 +106,7 @@ impl Range {
     pub const fn choices(self) -> &'static [Choice] {
         match self {
             Self::OneOf(choices) | Self::OneOfOr(choices, _, _) => choices,
-            Self::Any | Self::Within(..) | Self::Described(..) => &[],
+            Self::Any | Self::Within(..) | Self::Described(..) | Self::Bits(_) => &[],
         }
     }
 }

@@ -38,10 +38,20 @@ impl Plan {
     pub(super) fn of(file: &Backup, now: &Backup, with_communication: bool) -> Result<Self, Failure> {
         let capabilities = file.head.family.capabilities();
         let (mut skipped, mut missing) = (Vec::new(), Vec::new());
+        let words =
+            now.entries.iter().filter_map(|entry| Some((entry.row.place(), *entry.held.as_ref().ok()?)));
+        let way = Way::of(capabilities, words);
+        let mut end = way.clone();
+        for Entry { row, held } in &file.entries {
+            if let (Part::Setting, Ok(word)) = (capabilities.restoring.part(row), held) {
+                end.hold(row.place(), *word);
+            }
+        }
         for Entry { row, held } in &file.entries {
             let differs = held.as_ref().ok().copied() != now.word(row.place());
             let part = capabilities.restoring.part(row);
             let is_unread = held.is_err() || now.word(row.place()).is_none();
+            let exceeds = if differs && part == Part::Setting { end.exceeds(row) } else { None };
             let why = match (part, held) {
                 (Part::Rating | Part::Passing, _) => continue,
                 (_, Err(why)) => format!("could not be read when it was kept: {why}"),
@@ -52,10 +62,15 @@ impl Plan {
                 (Part::Setting | Part::Communication, Ok(_)) if now.word(row.place()).is_none() => {
                     "the drive does not tell what it holds".to_owned()
                 }
+                (Part::Setting, Ok(_)) => match &exceeds {
+                    Some(why) => format!("this drive cannot have it: {why}"),
+                    None => continue,
+                },
                 _ => continue,
             };
             // Who leaves the line as it is, or sets at the drive what is only set there, has left it out himself.
-            if is_unread && (part == Part::Setting || part == Part::Communication && with_communication) {
+            let cannot_be = is_unread || exceeds.is_some();
+            if cannot_be && (part == Part::Setting || part == Part::Communication && with_communication) {
                 missing.push(*row);
             }
             skipped.push((*row, why));
@@ -70,9 +85,6 @@ impl Plan {
             rows.filter_map(wanted).collect::<Vec<_>>()
         });
         let steps: Vec<Vec<Wanted>> = steps.filter(|step| !step.is_empty()).collect();
-        let words =
-            now.entries.iter().filter_map(|entry| Some((entry.row.place(), *entry.held.as_ref().ok()?)));
-        let way = Way::of(capabilities, words);
         let changes = in_steps(&steps, way.clone())?;
         for Change { row, wanted, .. } in &changes {
             if !row.range.allows(row.unit.number(*wanted)) {
