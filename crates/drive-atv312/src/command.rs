@@ -220,7 +220,11 @@ impl<P: Port> Drivecom for Atv312<P> {
         }
         self.read_meanings(Class::Command).await?;
         let controls = self.read_controls(Class::Command).await?;
-        let words = FastWords::in_status(status).state_words();
+        let fast = FastWords::in_status(status);
+        if let Some(reason) = fast.refuses_while_saving() {
+            return Ok(Some(reason));
+        }
+        let words = fast.state_words();
         let settings = &self.known.settings;
         let restart = settings.self_restart().filter(|_| !self.accepts_restart).map(Refusal::RestartsItself);
         let reverse = if direction == Direction::Reverse { settings.refuses_reverse() } else { None };

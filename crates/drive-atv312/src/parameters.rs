@@ -11,7 +11,7 @@ use drive_drivecom::ChartState;
 
 use crate::{
     Atv312,
-    registers::{ADC, CFG, CMD, CMDD, CMI, ETI, FCS, LFR, LFRD, RP, RPR, SCS, SLL, TTO, TUN, address},
+    registers::{ADC, CFG, CMD, CMDD, CMI, ETI, FCS, LAC, LFR, LFRD, RP, RPR, SCS, SLL, TTO, TUN, address},
     settings::Known,
     words::{ControlWord, ExtendedControl, ExtendedStatus},
 };
@@ -64,10 +64,13 @@ const MOVES_CONTROL: [u16; 20] = [
 impl<P: Port> Atv312<P> {
     /// Changes a parameter. One that is written only with the motor stopped is refused here while it runs, and so is
     /// `CMI`, whose bits give the held reference another unit and a stopped drive its lock. `AdC` is refused while operation
-    /// is enabled.
+    /// is enabled, everything while the drive saves its parameters, and a lower `LAC` always.
     pub(crate) async fn change_parameter(&mut self, row: &'static Row, word: u16) -> Result<Written> {
         const INJECTS: Refusal = Refusal::Settings(
             "AdC injects current into a motor at rest without a run command (p. 41): disable operation first, by a freewheel stop",
+        );
+        const LOWERED: Refusal = Refusal::Settings(
+            "LAC goes back to L2 or L1 only by a return to factory settings (p. 35): do that at the drive",
         );
         refuse_orders(row, word)?;
         let command = Command::WriteParameter(row.address);
@@ -76,6 +79,11 @@ impl<P: Port> Atv312<P> {
             if row.address == ADC.address() && words.chart() == Some(ChartState::OperationEnabled) {
                 return Err(self.refused(command, INJECTS));
             }
+        } else if let Some(reason) = self.fast_words(Class::Command).await?.refuses_while_saving() {
+            return Err(self.refused(command, reason));
+        }
+        if row.address == LAC.address() && word < self.registers.at(Class::Background).read(LAC).await? {
+            return Err(self.refused(command, LOWERED));
         }
         if let Some(reason) = self.refuses_writes() {
             return Err(self.refused(command, reason));

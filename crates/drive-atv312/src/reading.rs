@@ -106,10 +106,12 @@ impl FastWords {
     /// Why a setting cannot be changed now.
     pub(crate) fn refuses_settings(&self) -> Option<Refusal> {
         let words = self.state_words();
-        if words.is_driving() {
-            return Some(Refusal::MotorRunning);
-        }
-        words.eti.contains(ExtendedStatus::EEPROM_BUSY).then_some(Refusal::Settings(
+        if words.is_driving() { Some(Refusal::MotorRunning) } else { self.refuses_while_saving() }
+    }
+
+    /// Why no parameter is written now (p. 20, 22), and nothing is started.
+    pub(crate) fn refuses_while_saving(&self) -> Option<Refusal> {
+        self.state_words().eti.contains(ExtendedStatus::EEPROM_BUSY).then_some(Refusal::Settings(
             "the drive is saving its parameters to EEPROM (ETI bit 0): try again in a moment",
         ))
     }

@@ -464,3 +464,21 @@ async fn a_reference_from_elsewhere_that_never_stands_still_is_told_as_another_o
     let told = lacks_within(&mut drive, 20).await;
     assert_eq!(told.map(|(lack, _)| lack), Some(Lack::Reference));
 }
+
+/// "During saving (ETI.0 = 1), parameters cannot be written" (BBV51701 p. 20, 22): also what is written while the motor runs.
+#[tokio::test(start_paused = true)]
+async fn nothing_is_set_and_nothing_starts_while_the_drive_saves_its_parameters() {
+    let saving = [(3206, 0x4003)];
+    for (code, word) in [("ACC", 50), ("tdC", 10), ("SPAT", 3), ("SA2", 0)] {
+        let mut drive = drive(&[&FOR_THE_BUS, &STANDS, &saving]);
+        let refused = drive.write_parameter(row(code), word).await.unwrap_err();
+        let reason = because(&refused).map(|reason| reason.to_string()).unwrap_or_default();
+        assert!(reason.contains("ETI bit 0"), "{code}: {refused}");
+        assert_eq!(drive.into_port().written(), [], "{code}");
+    }
+    let mut drive = drive(&[&FOR_THE_BUS, &STANDS, &saving]);
+    let refused = drive.start(drive_core::Direction::Forward).await.unwrap_err();
+    let reason = because(&refused).map(|reason| reason.to_string()).unwrap_or_default();
+    assert!(reason.contains("ETI bit 0"), "{refused}");
+    assert_eq!(commands(drive), []);
+}

@@ -209,6 +209,18 @@ async fn an_external_fault_that_would_trip_as_soon_as_it_is_written_is_refused_f
     takes(SetUp::ForTheBus, &[("EtF", 172, &[("LEt", 1)]), ("LEt", 0, &[("EtF", 131)])]).await;
 }
 
+/// "L3 can only be restored to L2 or L1 and L2 to L1 by means of a factory setting" (BBV51701 p. 35).
+#[tokio::test(start_paused = true)]
+async fn an_access_level_is_not_lowered_by_a_write() {
+    let cases: [Refused<'_>; 3] = [
+        ("LAC", 0, &[], &["LAC", "factory settings", "p. 35"]),
+        ("LAC", 1, &[], &["LAC", "factory settings"]),
+        ("LAC", 0, &[("LAC", 1)], &["LAC", "factory settings"]),
+    ];
+    refuses(SetUp::ForTheBus, &cases).await;
+    takes(SetUp::Factory, &[("LAC", 1, &[])]).await;
+}
+
 /// BBV51701 p. 35, 36, 39 to 52.
 #[tokio::test(start_paused = true)]
 async fn a_choice_that_the_access_level_does_not_have_is_refused() {

@@ -279,7 +279,7 @@ async fn a_backup_of_one_drive_goes_into_another_but_for_what_that_one_cannot_ha
     assert_eq!(codes, ["LAC"]);
     for one in refused {
         assert!(one["slave"] == 1 && one["address"].is_u64(), "{one}");
-        assert!(one["why"].as_str().unwrap().contains("exception 03h"), "{one}");
+        assert!(one["why"].as_str().unwrap().contains("only by a return to factory settings"), "{one}");
     }
     let line = "refused: atv312@1, slave 1, LAC (3006): ";
     assert!(told.text.iter().any(|text| text.starts_with(line)), "{line} in {:?}", told.text);
