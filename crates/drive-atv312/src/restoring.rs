@@ -225,9 +225,24 @@ pub(crate) const RESTORING: Restoring = Restoring {
     control: &[CHCF, CD2, CD1, CCS, COP],
 };
 
-/// The ramps, whose unit `Inr` chooses (p. 38, 39).
-pub(crate) const SCALED: &[Scaled] = &[Scaled {
-    registers: &[ACC, DEC, AC2, DE2],
-    by: INR,
-    units: &[(0, Unit::scaled("s", 2)), (1, Unit::scaled("s", 1)), (2, Unit::scaled("s", 0))],
-}];
+/// Bit 9 of `CMI`.
+const HIGH_RESOLUTION: u16 = 1 << 9;
+/// 32767 points are 600 Hz, of a speed too: how many poles the motor has is no register.
+const POINTS: Unit = Unit::points("Hz", 2, 600).signed();
+
+/// The ramps, whose unit `Inr` chooses (p. 38, 39); what bit 9 of `CMI` makes points (p. 16, 17, 19 to 21), with its images (p. 25,
+/// 26: "identical").
+pub(crate) const SCALED: &[Scaled] = &[
+    Scaled {
+        registers: &[ACC, DEC, AC2, DE2],
+        by: INR,
+        mask: u16::MAX,
+        units: &[(0, Unit::scaled("s", 2)), (1, Unit::scaled("s", 1)), (2, Unit::scaled("s", 0))],
+    },
+    Scaled {
+        registers: &[LFR, RFR, LFR1, LFR2, LFRD, RFRD, LFD1, LFD2],
+        by: CMI,
+        mask: HIGH_RESOLUTION,
+        units: &[(HIGH_RESOLUTION, POINTS)],
+    },
+];

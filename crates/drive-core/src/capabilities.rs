@@ -216,7 +216,7 @@ impl Capabilities {
         let scaled = self.scaled.iter().find(|scaled| scaled.registers.contains(&row.address));
         let unit = scaled.and_then(|scaled| {
             let word = held(scaled.by)?;
-            scaled.units.iter().find(|(of, _)| *of == word).map(|(_, unit)| *unit)
+            scaled.units.iter().find(|(of, _)| *of == word & scaled.mask).map(|(_, unit)| *unit)
         });
         Row { unit: unit.unwrap_or(row.unit), ..*row }
     }

@@ -229,6 +229,21 @@ mod tests {
     }
 
     #[test]
+    fn points_of_a_full_scale_are_shown_in_its_unit_and_read_back() {
+        // BBV51701 p. 19: 32767 points are 600 Hz.
+        let unit = Unit::points("Hz", 2, 600).signed();
+        for (word, text) in [
+            (0, "0.00 Hz"),
+            (1_638, "29.99 Hz"),
+            (0x7FFF, "600.00 Hz"),
+            (1_638_u16.wrapping_neg(), "-29.99 Hz"),
+        ] {
+            assert_eq!((unit.show(word).as_str(), unit.read(text)), (text, Some(word)));
+        }
+        assert_eq!(unit.read("601"), None);
+    }
+
+    #[test]
     fn a_listed_value_is_shown_with_its_meaning_and_read_by_its_mnemonic() {
         assert_eq!(SLL.row().show(1), "1 YES (freewheel)");
         assert_eq!(SLL.row().read("YES"), Some(1));

@@ -74,7 +74,9 @@ pub struct Scaled {
     pub registers: &'static [u16],
     /// The register that chooses.
     pub by: u16,
-    /// The unit for each of its words.
+    /// Which of its bits choose.
+    pub mask: u16,
+    /// The unit for each of its words, as far as these bits go.
     pub units: &'static [(u16, Unit)],
 }
 

@@ -24,7 +24,12 @@ pub enum Form {
     Bits,
     /// As the number of a listed value.
     Code,
+    /// As a decimal number in the unit, of which 32767 points are so many: "resolution 32767 points = 600 Hz".
+    Points(u16),
 }
+
+/// How many points a full scale has.
+const POINTS: i64 = 32_767;
 
 impl Unit {
     /// A plain count.
@@ -46,7 +51,26 @@ impl Unit {
         Self { signed: true, ..self }
     }
 
-    /// The word as the number it stands for, in the unit's smallest step.
+    /// A number with `decimals` places in the unit `symbol`, of which 32767 counts are `full`.
+    #[must_use]
+    pub const fn points(symbol: &'static str, decimals: u8, full: u16) -> Self {
+        Self { form: Form::Points(full), ..Self::scaled(symbol, decimals) }
+    }
+
+    /// The word as the number that it stands for, as it is shown: in steps of its last decimal.
+    #[must_use]
+    pub fn shown(self, word: u16) -> i64 {
+        let number = i64::from(self.number(word));
+        match self.form {
+            Form::Points(full) => {
+                let whole = number * i64::from(full) * 10_i64.pow(self.decimals.into());
+                (whole + whole.signum() * POINTS / 2) / POINTS
+            }
+            Form::Number | Form::Bits | Form::Code => number,
+        }
+    }
+
+    /// The word as the number it stands for, in counts.
     #[must_use]
     pub const fn number(self, word: u16) -> i32 {
         if self.signed { word as i16 as i32 } else { word as i32 }
@@ -60,7 +84,7 @@ impl Unit {
             return format!("{word:04X}h");
         }
         // Writing into a String does not fail.
-        let _ = write_decimal(&mut text, i64::from(self.number(word)), self.decimals);
+        let _ = write_decimal(&mut text, self.shown(word), self.decimals);
         if !self.symbol.is_empty() {
             text.push(' ');
             text.push_str(self.symbol);
@@ -80,6 +104,14 @@ impl Unit {
             return u16::from_str_radix(digits, 16).ok();
         }
         let number = read_decimal(text.strip_suffix(self.symbol).unwrap_or(text).trim_end(), self.decimals)?;
+        let number = match self.form {
+            Form::Points(full) if full > 0 => {
+                let full = i64::from(full) * 10_i64.pow(self.decimals.into());
+                let whole = number.checked_mul(POINTS)?;
+                (whole + whole.signum() * full / 2) / full
+            }
+            Form::Points(_) | Form::Number | Form::Bits | Form::Code => number,
+        };
         if self.signed {
             i16::try_from(number).ok().map(i16::cast_unsigned)
         } else {

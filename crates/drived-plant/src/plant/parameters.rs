@@ -157,9 +157,9 @@ impl ValueView {
     fn of(row: &Row, raw: u16) -> Self {
         match (row.choice(raw), row.unit.form) {
             (Some(choice), _) => Self::Text(choice.code.to_owned()),
-            (None, Form::Number) => {
+            (None, Form::Number | Form::Points(_)) => {
                 let step = 10_f64.powi(i32::from(row.unit.decimals));
-                Self::Number(f64::from(row.unit.number(raw)) / step)
+                Self::Number(row.unit.shown(raw) as f64 / step)
             }
             (None, Form::Bits | Form::Code) => Self::Text(row.unit.show(raw)),
         }
@@ -170,6 +170,11 @@ impl Words {
     fn of(&self, drive: &DriveHandle, row: &Row) -> Option<(u16, Instant)> {
         let words = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         words.get(&(drive.name().to_string(), row.place())).copied()
+    }
+
+    /// Whether a word was read a moment ago.
+    fn is_young(&self, drive: &DriveHandle, row: &Row) -> bool {
+        self.of(drive, row).is_some_and(|(_, at)| at.elapsed() <= YOUNG)
     }
 
     /// A row in the unit that it has, as far as what chooses that has been read.
@@ -198,10 +203,17 @@ impl Plant {
         let until = Instant::now() + wait;
         let mut views = Vec::new();
         for row in drive.capabilities().rows {
+            // What chooses the unit may stand behind it in the map, and a number without its unit would be another one.
+            let by = drive.capabilities().scaled_by(row.address);
+            if let Some(by) = by.filter(|by| !self.0.words.is_young(drive, by))
+                && Instant::now() < until
+                && let Ok(Ok(raw)) = timeout_at(until, drive.read_parameter(by)).await
+            {
+                self.0.words.keep(drive, by, Some(raw));
+            }
             let mut word = self.0.words.of(drive, row);
             let (mut error, mut read) = (None, None);
-            let is_young = word.is_some_and(|(_, at)| at.elapsed() <= YOUNG);
-            if row.access.is_readable() && !is_young && Instant::now() < until {
+            if row.access.is_readable() && !self.0.words.is_young(drive, row) && Instant::now() < until {
                 match timeout_at(until, drive.read_parameter(row)).await {
                     Ok(Ok(raw)) => {
                         read = Some(raw);

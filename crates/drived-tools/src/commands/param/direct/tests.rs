@@ -243,3 +243,33 @@ async fn a_choice_that_the_access_level_does_not_have_is_refused() {
     .await;
     takes(SetUp::ForTheBus, &[("rPS", 175, &[]), ("bLC", 2, &[])]).await;
 }
+
+/// "Resolution 32767 points = 600 Hz if bit 9 of CMI = 1" (BBV51701 p. 16, 17, 19, 21, 25): 1638 points are 29.994 Hz.
+#[tokio::test(start_paused = true)]
+async fn at_high_resolution_a_reference_and_an_output_are_shown_as_the_drive_counts_them() {
+    let mut bench = Bench::of(Family::ATV312, SetUp::ForTheBus);
+    let machine = bench.machine.clone();
+    let Source::OnLine(one) = &mut bench.source else { panic!("it is on a line") };
+    let rows = one.drive.capabilities().rows;
+    for (cmi, hertz, rpm) in [(0x0000, "163.8 Hz", "1638 rpm"), (0x0200, "29.99 Hz", "29.99 Hz")] {
+        assert!(machine.poke(8_504, cmi));
+        for (code, shown) in [
+            ("rFr", hertz),
+            ("LFr", hertz),
+            ("LFR1", hertz),
+            ("LFR2", hertz),
+            ("RFRD", rpm),
+            ("LFRD", rpm),
+            ("LFD1", rpm),
+            ("LFD2", rpm),
+            ("FrH", "163.8 Hz"),
+            ("FRHD", "1638 rpm"),
+        ] {
+            let row = in_units(&mut *one.drive, Row::find(rows, code).unwrap()).await.unwrap();
+            assert_eq!(row.show(1_638), shown, "{code} with CMI {cmi:04X}h");
+            let view = json!(ParameterView::read(one.drive.capabilities(), &row, 1_638));
+            let number = shown.split(' ').next().and_then(|number| number.parse::<f64>().ok());
+            assert_eq!(view["value"].as_f64(), number, "{code}");
+        }
+    }
+}
