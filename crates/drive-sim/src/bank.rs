@@ -75,7 +75,7 @@ impl Bank {
         let cell = |row: &'static Row| {
             let factory = match row.factory {
                 Factory::Value(value) => value,
-                Factory::None | Factory::Described(_) => 0,
+                Factory::None | Factory::Described(_) | Factory::Chosen(..) | Factory::Percent(..) => 0,
             };
             Cell { row, factory, ram: factory, eeprom: factory }
         };

@@ -106,7 +106,9 @@ pub fn factory(capabilities: &Capabilities, row: &Row) -> String {
     match row.factory {
         Factory::None => String::new(),
         Factory::Value(word) => brief(&capabilities.in_units(row, of_factory), word),
-        Factory::Described(rule) => rule.to_owned(),
+        Factory::Described(rule) | Factory::Chosen(_, _, rule) | Factory::Percent(_, _, rule) => {
+            rule.to_owned()
+        }
     }
 }
 

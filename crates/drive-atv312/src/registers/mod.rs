@@ -21,6 +21,10 @@ const SECOND: registers::Unit = registers::Unit::scaled("s", 1);
 /// The manual prints 0.1 s, which is the factory's `Inr` (p. 38, 39); a count is whatever `Inr` says.
 const RAMP: registers::Unit = registers::Unit::scaled("× Inr", 0);
 
+/// `bFr` chooses it (p. 27–29, 49).
+const MAINS_FREQUENCY: registers::Factory =
+    registers::Factory::Chosen(address::BFR, &[(0, 500), (1, 600)], "50.0 Hz, with bFr = 60: 60.0 Hz");
+
 registers! {
     /// Every register of an Altivar 312.
     pub const ROWS;
@@ -105,7 +109,7 @@ registers! {
 
     // Configuration and adjustment variables (p. 27–56).
     LSP: ReadWrite(3105, "LSP", "low speed", RamUntilSaved, HZ, Range::Described(0, 5_000, "0 to HSP"), Factory::Value(0), Manual, "BBV52816 p. 12 and BBV51701 p. 27");
-    HSP: ReadWrite(3104, "HSP", "high speed", RamUntilSaved, HZ, Range::Described(0, 5_000, "LSP to tFr"), Factory::Described("50.0 Hz, with bFr = 60: 60.0 Hz"), Manual, "BBV52816 p. 12 and BBV51701 p. 27");
+    HSP: ReadWrite(3104, "HSP", "high speed", RamUntilSaved, HZ, Range::Described(0, 5_000, "LSP to tFr"), MAINS_FREQUENCY, Manual, "BBV52816 p. 12 and BBV51701 p. 27");
     ITH: ReadWrite(9622, "ItH", "motor thermal protection - max. thermal current", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0.2 to 1.5 In"), Factory::Described("by the drive's rating"), Elsewhere, "BBV51701 p. 27");
     UFR: ReadWrite(9623, "UFr", "IR compensation/Voltage boost", RamUntilSaved, PERCENT, Range::Within(0, 100), Factory::Value(20), Elsewhere, "BBV51701 p. 27");
     FLG: ReadWrite(9620, "FLG", "frequency loop gain", RamUntilSaved, PERCENT, Range::Within(1, 100), Factory::Value(20), Elsewhere, "BBV51701 p. 27");
@@ -113,15 +117,15 @@ registers! {
     SLP: ReadWrite(9625, "SLP", "slip compensation", RamUntilSaved, PERCENT, Range::Within(0, 150), Factory::Value(100), Elsewhere, "BBV51701 p. 27");
     JPF: ReadWrite(11301, "JPF", "skip frequency", RamUntilSaved, HZ, Range::Within(0, 5000), Factory::Value(0), Elsewhere, "BBV51701 p. 27");
     JF2: ReadWrite(11302, "JF2", "2nd skip frequency", RamUntilSaved, HZ, Range::Within(0, 5000), Factory::Value(0), Elsewhere, "BBV51701 p. 28");
-    CLI: ReadWrite(9201, "CLI", "current limit", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0.25 to 1.5 In"), Factory::Described("1.5 In"), Elsewhere, "BBV51701 p. 28");
+    CLI: ReadWrite(9201, "CLI", "current limit", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0.25 to 1.5 In"), Factory::Percent(address::INV, 150, "1.5 In"), Elsewhere, "BBV51701 p. 28");
     TLS: ReadWrite(11701, "tLS", "low speed operating time", RamUntilSaved, SECOND, Range::Within(0, 9999), Factory::Value(0), Elsewhere, "BBV51701 p. 28");
-    FTD: WriteStopped(11003, "Ftd", "motor frequency threshold", RamUntilSaved, HZ, Range::Within(0, 5000), Factory::Described("50.0 Hz, with bFr = 60: 60.0 Hz"), Elsewhere, "BBV51701 p. 28");
+    FTD: WriteStopped(11003, "Ftd", "motor frequency threshold", RamUntilSaved, HZ, Range::Within(0, 5000), MAINS_FREQUENCY, Elsewhere, "BBV51701 p. 28");
     TTD: WriteStopped(11002, "ttd", "motor thermal state threshold", RamUntilSaved, PERCENT, Range::Within(0, 118), Factory::Value(100), Elsewhere, "BBV51701 p. 28");
-    CTD: WriteStopped(11001, "Ctd", "motor current threshold", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0 to 1.5 In"), Factory::Described("In"), Elsewhere, "BBV51701 p. 28");
+    CTD: WriteStopped(11001, "Ctd", "motor current threshold", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0 to 1.5 In"), Factory::Percent(address::INV, 100, "In"), Elsewhere, "BBV51701 p. 28");
     SDS: ReadWrite(12001, "SdS", "USPL/USPH scale factor", RamUntilSaved, Unit::scaled("", 1), Range::Within(1, 2000), Factory::Value(300), Elsewhere, "BBV51701 p. 28");
     BFR: WriteStopped(3015, "bFr", "standard motor frequency", RamUntilSaved, Unit::CODE, Range::OneOf(MAINS), Factory::Value(0), Elsewhere, "BBV51701 p. 28");
     UNS: WriteStopped(9601, "UnS", "nominal motor voltage given on the rating plate", RamUntilSaved, Unit::scaled("V", 0), Range::Described(100, 600, "M2, M3: 100 to 240; N4: 100 to 500; S6: 100 to 600; UnS/FrS at most 7, 14 or 17 V/Hz"), Factory::Described("by the drive's rating"), Elsewhere, "BBV51701 p. 28 and 29");
-    FRS: WriteStopped(9602, "FrS", "nominal motor frequency given on the rating plate", RamUntilSaved, HZ, Range::Within(100, 5000), Factory::Described("50.0 Hz, with bFr = 60: 60.0 Hz"), Elsewhere, "BBV51701 p. 29");
+    FRS: WriteStopped(9602, "FrS", "nominal motor frequency given on the rating plate", RamUntilSaved, HZ, Range::Within(100, 5000), MAINS_FREQUENCY, Elsewhere, "BBV51701 p. 29");
     NCR: WriteStopped(9603, "nCr", "nominal motor current given on the rating plate", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0.25 to 1.5 In"), Factory::Described("by the drive's rating"), Elsewhere, "BBV51701 p. 29");
     NSP: WriteStopped(9604, "nSP", "nominal motor speed given on the rating plate", RamUntilSaved, RPM, Range::Within(0, 32_767), Factory::Described("by the drive's rating"), Elsewhere, "BBV51701 p. 29");
     COS: WriteStopped(9606, "COS", "motor Cos Phi given on the rating plate", RamUntilSaved, Unit::scaled("", 2), Range::Within(50, 100), Factory::Described("by the drive's rating"), Elsewhere, "BBV51701 p. 29");
@@ -132,14 +136,14 @@ registers! {
     UFT: WriteStopped(9607, "UFt", "selection of the type of voltage/frequency ratio", RamUntilSaved, Unit::CODE, Range::OneOf(MOTOR_LAWS), Factory::Value(2), Elsewhere, "BBV51701 p. 31");
     NRD: WriteStopped(3107, "nrd", "noise reduction", RamUntilSaved, Unit::CODE, Range::OneOf(MODULATION), Factory::Value(1), Elsewhere, "BBV51701 p. 31");
     SFR: ReadWrite(3102, "SFr", "switching frequency", RamUntilSaved, Unit::scaled("kHz", 1), Range::Within(20, 160), Factory::Value(40), Manual, "BBV52816 p. 12 and BBV51701 p. 31");
-    TFR: WriteStopped(3103, "tFr", "maximum output frequency", RamUntilSaved, HZ, Range::Within(100, 5000), Factory::Described("60.0 Hz, with bFr = 60: 72.0 Hz"), Manual, "BBV52816 p. 12 and BBV51701 p. 31");
+    TFR: WriteStopped(3103, "tFr", "maximum output frequency", RamUntilSaved, HZ, Range::Within(100, 5000), Factory::Chosen(address::BFR, &[(0, 600), (1, 720)], "60.0 Hz, with bFr = 60: 72.0 Hz"), Manual, "BBV52816 p. 12 and BBV51701 p. 31");
     SRF: WriteStopped(9101, "SrF", "suppression of the speed loop filter", RamUntilSaved, Unit::CODE, Range::OneOf(SPEED_FILTER), Factory::Value(0), Elsewhere, "BBV51701 p. 31");
     SCS: WriteStopped(8001, "SCS", "saving the configuration", Volatile, Unit::CODE, Range::OneOf(SAVE_CONFIGURATION), Factory::Value(0), Elsewhere, "BBV51701 p. 31");
     CFG: WriteStopped(3052, "CFG", "source configuration", RamUntilSaved, Unit::CODE, Range::OneOf(CONFIGURATIONS), Factory::Value(1), Elsewhere, "BBV51701 p. 32");
     FCS: WriteStopped(8002, "FCS", "return to factory settings/Restore configuration", Volatile, Unit::CODE, Range::OneOf(RESTORE_CONFIGURATION), Factory::Value(0), Elsewhere, "BBV51701 p. 32");
     TCC: WriteStopped(11101, "tCC", "2-wire/3-wire control", RamUntilSaved, Unit::CODE, Range::OneOf(WIRING), Factory::Value(0), Elsewhere, "BBV51701 p. 33");
     TCT: WriteStopped(11102, "tCt", "type of 2-wire control", RamUntilSaved, Unit::CODE, Range::OneOf(TWO_WIRE), Factory::Value(1), Elsewhere, "BBV51701 p. 33");
-    RRS: WriteStopped(11105, "rrS", "reverse operation via logic input", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS), Factory::Described("130, with tCC = 3C: 131, with tCC = LOC: 0"), Elsewhere, "BBV51701 p. 33");
+    RRS: WriteStopped(11105, "rrS", "reverse operation via logic input", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS), Factory::Chosen(address::TCC, &[(0, 130), (1, 131), (2, 0)], "130, with tCC = 3C: 131, with tCC = LOC: 0"), Elsewhere, "BBV51701 p. 33");
     CRL3: WriteStopped(4434, "CrL3", "value for low speed (LSP) on input AI3", RamUntilSaved, Unit::scaled("mA", 1), Range::Within(0, 200), Factory::Value(40), Elsewhere, "BBV51701 p. 33");
     CRH3: WriteStopped(4444, "CrH3", "value for high speed (HSP) on input AI3", RamUntilSaved, Unit::scaled("mA", 1), Range::Within(40, 200), Factory::Value(200), Elsewhere, "BBV51701 p. 33");
     AO1T: WriteStopped(4601, "AO1t", "configuration of the analog output", RamUntilSaved, Unit::CODE, Range::OneOf(ANALOG_TYPES), Factory::Value(2), Elsewhere, "BBV51701 p. 34");
@@ -175,18 +179,18 @@ registers! {
     FST: WriteStopped(11204, "FSt", "fast stop via logic input", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Value(0), Elsewhere, "BBV51701 p. 40");
     DCF: WriteStopped(11230, "dCF", "coefficient for dividing the deceleration ramp time for fast stopping", RamUntilSaved, Unit::COUNT, Range::Within(0, 10), Factory::Value(4), Elsewhere, "BBV51701 p. 40");
     DCI: WriteStopped(11203, "dCI", "DC injection via logic input", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Value(0), Elsewhere, "BBV51701 p. 40");
-    IDC: ReadWrite(11210, "IdC", "level of DC injection braking current activated via logic input or selected as stop mode", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0 to In"), Factory::Described("0.7 In"), Elsewhere, "BBV51701 p. 40");
+    IDC: ReadWrite(11210, "IdC", "level of DC injection braking current activated via logic input or selected as stop mode", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0 to In"), Factory::Percent(address::INV, 70, "0.7 In"), Elsewhere, "BBV51701 p. 40");
     TDC: ReadWrite(11211, "tdC", "total DC injection braking time selected as normal stop mode", RamUntilSaved, SECOND, Range::Within(1, 300), Factory::Value(5), Elsewhere, "BBV51701 p. 41");
     NST: WriteStopped(11202, "nSt", "freewheel stop via logic input", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS), Factory::Value(0), Elsewhere, "BBV51701 p. 41");
     ADC: ReadWrite(10401, "AdC", "automatic standstill DC injection", RamUntilSaved, Unit::CODE, Range::OneOf(STANDSTILL_INJECTION), Factory::Value(1), Elsewhere, "BBV51701 p. 41");
     TDC1: ReadWrite(10402, "tdC1", "automatic standstill DC injection time", RamUntilSaved, SECOND, Range::Within(1, 300), Factory::Value(50), Elsewhere, "BBV51701 p. 41");
-    SDC1: ReadWrite(10403, "SdC1", "level of automatic standstill DC injection current", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0 to 1.2 In"), Factory::Described("0.7 In"), Elsewhere, "BBV51701 p. 41");
+    SDC1: ReadWrite(10403, "SdC1", "level of automatic standstill DC injection current", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0 to 1.2 In"), Factory::Percent(address::INV, 70, "0.7 In"), Elsewhere, "BBV51701 p. 41");
     TDC2: ReadWrite(10404, "tdC2", "2nd automatic standstill DC injection time", RamUntilSaved, SECOND, Range::Within(0, 300), Factory::Value(0), Elsewhere, "BBV51701 p. 41");
-    SDC2: ReadWrite(10405, "SdC2", "2nd level of standstill DC injection current", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0 to 1.2 In"), Factory::Described("0.5 In"), Elsewhere, "BBV51701 p. 41");
+    SDC2: ReadWrite(10405, "SdC2", "2nd level of standstill DC injection current", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0 to 1.2 In"), Factory::Percent(address::INV, 50, "0.5 In"), Elsewhere, "BBV51701 p. 41");
     SA2: WriteStopped(11801, "SA2", "summing input 2", RamUntilSaved, Unit::CODE, Range::OneOf(SUMMING), Factory::Value(2), Elsewhere, "BBV51701 p. 42");
     SA3: WriteStopped(11802, "SA3", "summing input 3", RamUntilSaved, Unit::CODE, Range::OneOf(SUMMING), Factory::Value(0), Elsewhere, "BBV51701 p. 42");
-    PS2: WriteStopped(11401, "PS2", "2 preset speeds", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Described("131, with tCC = 3C: 0"), Elsewhere, "BBV51701 p. 42");
-    PS4: WriteStopped(11402, "PS4", "4 preset speeds", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Described("132, with tCC = 3C: 0"), Elsewhere, "BBV51701 p. 43");
+    PS2: WriteStopped(11401, "PS2", "2 preset speeds", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Chosen(address::TCC, &[(0, 131), (1, 0), (2, 131)], "131, with tCC = 3C: 0"), Elsewhere, "BBV51701 p. 42");
+    PS4: WriteStopped(11402, "PS4", "4 preset speeds", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Chosen(address::TCC, &[(0, 132), (1, 0), (2, 132)], "132, with tCC = 3C: 0"), Elsewhere, "BBV51701 p. 43");
     PS8: WriteStopped(11403, "PS8", "8 preset speeds", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Value(0), Elsewhere, "BBV51701 p. 43");
     PS16: WriteStopped(11404, "PS16", "16 preset speeds", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Value(0), Elsewhere, "BBV51701 p. 43");
     SP2: ReadWrite(11410, "SP2", "2nd preset speed", RamUntilSaved, HZ, Range::Within(0, 5_000), Factory::Value(100), Elsewhere, "BBV51701 p. 44");
@@ -204,7 +208,7 @@ registers! {
     SP14: ReadWrite(11422, "SP14", "14th preset speed", RamUntilSaved, HZ, Range::Within(0, 5_000), Factory::Value(800), Elsewhere, "BBV51701 p. 44");
     SP15: ReadWrite(11423, "SP15", "15th preset speed", RamUntilSaved, HZ, Range::Within(0, 5_000), Factory::Value(900), Elsewhere, "BBV51701 p. 44");
     SP16: ReadWrite(11424, "SP16", "16th preset speed", RamUntilSaved, HZ, Range::Within(0, 5_000), Factory::Value(1000), Elsewhere, "BBV51701 p. 44");
-    JOG: WriteStopped(11110, "JOG", "jog operation", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS), Factory::Described("0, with tCC = 3C: 132"), Elsewhere, "BBV51701 p. 45");
+    JOG: WriteStopped(11110, "JOG", "jog operation", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS), Factory::Chosen(address::TCC, &[(0, 0), (1, 132), (2, 0)], "0, with tCC = 3C: 132"), Elsewhere, "BBV51701 p. 45");
     JGF: ReadWrite(11111, "JGF", "jog operation reference", RamUntilSaved, HZ, Range::Within(0, 100), Factory::Value(100), Elsewhere, "BBV51701 p. 45");
     USP: WriteStopped(11501, "USP", "+ speed (motorized potentiometer)", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS), Factory::Value(0), Elsewhere, "BBV51701 p. 45");
     DSP: WriteStopped(11502, "dSP", "- speed (motorized potentiometer)", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS), Factory::Value(0), Elsewhere, "BBV51701 p. 45");
@@ -230,10 +234,10 @@ registers! {
     BET: WriteStopped(10005, "bEt", "brake engage time", RamUntilSaved, Unit::scaled("s", 2), Range::Within(0, 500), Factory::Value(50), Elsewhere, "BBV51701 p. 47");
     BIP: WriteStopped(10007, "bIP", "brake release pulse", RamUntilSaved, Unit::CODE, Range::OneOf(BRAKE_PULSE), Factory::Value(0), Elsewhere, "BBV51701 p. 47");
     LC2: WriteStopped(9202, "LC2", "switching for second current limit", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Value(0), Elsewhere, "BBV51701 p. 48");
-    CL2: ReadWrite(9203, "CL2", "2nd current limit", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0.25 to 1.5 In"), Factory::Described("1.5 In"), Elsewhere, "BBV51701 p. 48");
+    CL2: ReadWrite(9203, "CL2", "2nd current limit", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0.25 to 1.5 In"), Factory::Percent(address::INV, 150, "1.5 In"), Elsewhere, "BBV51701 p. 48");
     CHP: WriteStopped(8011, "CHP", "switching, motor 2", RamUntilSaved, Unit::CODE, Range::OneOf(INPUTS_AND_BITS), Factory::Value(0), Elsewhere, "BBV51701 p. 48");
     UNS2: WriteStopped(9701, "UnS2", "nominal motor voltage (motor 2) given on the rating plate", RamUntilSaved, Unit::scaled("V", 0), Range::Described(100, 600, "M2, M3: 100 to 240; N4: 100 to 500; S6: 100 to 600; UnS2/FrS2 at most 7, 14 or 17 V/Hz"), Factory::Described("by the drive's rating"), Elsewhere, "BBV51701 p. 49");
-    FRS2: WriteStopped(9702, "FrS2", "nominal motor frequency (motor 2) given on the rating plate", RamUntilSaved, HZ, Range::Within(100, 5000), Factory::Described("50.0 Hz, with bFr = 60: 60.0 Hz"), Elsewhere, "BBV51701 p. 49");
+    FRS2: WriteStopped(9702, "FrS2", "nominal motor frequency (motor 2) given on the rating plate", RamUntilSaved, HZ, Range::Within(100, 5000), MAINS_FREQUENCY, Elsewhere, "BBV51701 p. 49");
     NCR2: WriteStopped(9703, "nCr2", "nominal motor current (motor 2) given on the rating plate", RamUntilSaved, AMPERE, Range::Described(0, 65_535, "0.25 to 1.5 In"), Factory::Described("by the drive's rating"), Elsewhere, "BBV51701 p. 49");
     NSP2: WriteStopped(9704, "nSP2", "nominal motor speed (motor 2) given on the rating plate", RamUntilSaved, RPM, Range::Within(0, 32_767), Factory::Described("by the drive's rating"), Elsewhere, "BBV51701 p. 49");
     COS2: WriteStopped(9706, "COS2", "motor Cos Phi (motor 2) given on the rating plate", RamUntilSaved, Unit::scaled("", 2), Range::Within(50, 100), Factory::Described("by the drive's rating"), Elsewhere, "BBV51701 p. 49");
@@ -253,7 +257,7 @@ registers! {
     LET: WriteStopped(7090, "LEt", "configuration of external fault detection", RamUntilSaved, Unit::CODE, Range::OneOf(EXTERNAL_FAULT), Factory::Value(1), Elsewhere, "BBV51701 p. 52");
     EPL: WriteStopped(7006, "EPL", "stop mode in the event of an external fault EPF", RamUntilSaved, Unit::CODE, Range::OneOf(REACTIONS), Factory::Value(1), Elsewhere, "BBV51701 p. 52");
     OPL: WriteStopped(9611, "OPL", "configuration of motor phase loss detection", RamUntilSaved, Unit::CODE, Range::OneOf(MOTOR_PHASE), Factory::Value(1), Elsewhere, "BBV51701 p. 52");
-    IPL: WriteStopped(7002, "IPL", "configuration of line phase loss detection", RamUntilSaved, Unit::CODE, Range::OneOf(LINE_PHASE), Factory::Described("1, on ATV312···M2: 0"), Elsewhere, "BBV51701 p. 52");
+    IPL: WriteStopped(7002, "IPL", "configuration of line phase loss detection", RamUntilSaved, Unit::CODE, Range::OneOf(LINE_PHASE), Factory::Chosen(address::VCAL, &[(1, 0), (2, 1), (3, 1), (4, 1)], "1, on ATV312···M2: 0"), Elsewhere, "BBV51701 p. 52");
     OHL: WriteStopped(7008, "OHL", "stop mode in the event of the drive overheating OHF", RamUntilSaved, Unit::CODE, Range::OneOf(REACTIONS), Factory::Value(1), Elsewhere, "BBV51701 p. 53");
     OLL: WriteStopped(7009, "OLL", "stop mode in the event of a motor overload OLF", RamUntilSaved, Unit::CODE, Range::OneOf(REACTIONS), Factory::Value(1), Elsewhere, "BBV51701 p. 53");
     // p. 9: the setting of SLL and COL "is saved if the power supply is disconnected"; by what is not said.

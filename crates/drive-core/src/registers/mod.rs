@@ -64,7 +64,7 @@ pub use guard::refuse_commands;
 pub use limits::{Allows, Exceeded, Limit};
 pub use relations::{Holds, Relation};
 pub use restoring::{Change, Part, Restoring, Scaled, Step, in_order};
-pub use row::{Choice, Confidence, Factory, Range, Row, Storage, Written};
+pub use row::{Choice, Confidence, Factory, NoFactory, Range, Row, Storage, Written};
 pub use space::{Place, Space};
 pub use unit::{Form, Unit};
 

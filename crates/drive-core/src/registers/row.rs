@@ -118,8 +118,57 @@ pub enum Factory {
     None,
     /// The word.
     Value(u16),
-    /// A rule in words ("0.7 In").
+    /// A rule in words ("by the drive's rating").
     Described(&'static str),
+    /// By the word of another register, and the rule in words.
+    Chosen(u16, &'static [(u16, u16)], &'static str),
+    /// So many percent of what another register holds in the same unit, and the rule in words ("0.7 In").
+    Percent(u16, u16, &'static str),
+}
+
+/// Why a factory setting is no number for a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum NoFactory {
+    /// The manual prints none.
+    NotPrinted,
+    /// It prints this rule in words.
+    Rule(&'static str),
+    /// It depends on this register, of which nothing is known.
+    Unknown(u16),
+    /// It depends on this register, and the manual prints none for what that holds.
+    NoneFor(u16, u16),
+}
+
+impl Factory {
+    /// The words that a drive may have as factory setting which holds this: two where the manual's share is no whole count, for to
+    /// which of them the drive rounds is printed nowhere.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn words(self, held: impl Fn(u16) -> Option<u16>) -> Result<[u16; 2], NoFactory> {
+        let of = |register: u16| held(register).ok_or(NoFactory::Unknown(register));
+        match self {
+            Self::None => Err(NoFactory::NotPrinted),
+            Self::Value(word) => Ok([word; 2]),
+            Self::Described(rule) => Err(NoFactory::Rule(rule)),
+            Self::Chosen(by, words, _) => {
+                let known = of(by)?;
+                let (_, word) =
+                    words.iter().find(|(of, _)| *of == known).ok_or(NoFactory::NoneFor(by, known))?;
+                Ok([*word; 2])
+            }
+            Self::Percent(by, percent, _) => {
+                let known = of(by)?;
+                let hundredfold = u32::from(known) * u32::from(percent);
+                let (below, above) = (hundredfold / 100, hundredfold.div_ceil(100));
+                match (u16::try_from(below), u16::try_from(above)) {
+                    (Ok(below), Ok(above)) if known > 0 => Ok([below, above]),
+                    _ => Err(NoFactory::NoneFor(by, known)),
+                }
+            }
+        }
+    }
 }
 
 /// How sure a fact is.
@@ -214,5 +263,23 @@ impl Row {
                 }
             }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_factory_setting_that_another_register_chooses_is_known_where_that_is() {
+        let hertz = Factory::Chosen(3_015, &[(0, 500), (1, 600)], "50.0 Hz, with bFr = 60: 60.0 Hz");
+        assert_eq!([0, 1].map(|word| hertz.words(|_| Some(word))), [Ok([500; 2]), Ok([600; 2])]);
+        assert_eq!(hertz.words(|_| None), Err(NoFactory::Unknown(3_015)));
+        assert_eq!(hertz.words(|_| Some(7)), Err(NoFactory::NoneFor(3_015, 7)));
+        // 1.5 times 4.1 A are 6.15 A.
+        let share = Factory::Percent(3_017, 150, "1.5 In");
+        assert_eq!(share.words(|_| Some(41)), Ok([61, 62]));
+        assert_eq!(share.words(|_| Some(40)), Ok([60, 60]));
+        assert_eq!(share.words(|_| Some(0)), Err(NoFactory::NoneFor(3_017, 0)));
     }
 }

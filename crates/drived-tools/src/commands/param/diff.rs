@@ -6,7 +6,6 @@ use drive_core::{
     Row,
     registers::{Form, Part},
 };
-use drive_families::Family;
 use serde_json::{Value, json};
 
 use super::{file::Backup, source::SourceArgs};
@@ -64,7 +63,7 @@ pub struct Comparison {
     pub differences: Vec<Difference>,
     /// Registers that are the same.
     pub same: usize,
-    /// Registers for which the manual prints no number as factory setting, and those that could not be read.
+    /// Registers that have no number as factory setting of this drive, and those that could not be read.
     pub unjudged: Vec<Difference>,
 }
 
@@ -107,7 +106,7 @@ async fn sides(args: &Args) -> Result<[Side; 2], Failure> {
         }
         (true, Some(false)) => {
             let right = side(args, second.unwrap_or(first)).await?;
-            Ok([Side::factory(right.backup.head.family), right])
+            Ok([Side::factory(&right.backup), right])
         }
         (false, other) => {
             let left = side(args, first).await?;
@@ -117,7 +116,7 @@ async fn sides(args: &Args) -> Result<[Side; 2], Failure> {
                     let named = args.source.of_file(&left.backup.head)?;
                     Side { title: named.name(), backup: args.source.read(&named).await? }
                 }
-                _ => Side::factory(left.backup.head.family),
+                _ => Side::factory(&left.backup),
             };
             Ok([left, right])
         }
@@ -133,8 +132,8 @@ async fn side(args: &Args, word: &str) -> Result<Side, Failure> {
 }
 
 impl Side {
-    fn factory(family: Family) -> Self {
-        Self { title: FACTORY.to_owned(), backup: Backup::of_factory(family) }
+    fn factory(of: &Backup) -> Self {
+        Self { title: FACTORY.to_owned(), backup: Backup::of_factory(of) }
     }
 }
 
@@ -176,7 +175,8 @@ impl Comparison {
 
     fn say(&self, left: &str, right: &str) -> Result<(), Failure> {
         if self.differences.is_empty() {
-            output::say(format_args!("{left} and {right}: no difference"))?;
+            let among = if self.unjudged.is_empty() { "" } else { " in what can be compared" };
+            output::say(format_args!("{left} and {right}: no difference{among}"))?;
         } else {
             let mut table = Table::new(["parameter", left, right, "what it is"]);
             for Difference { row, sides } in &self.differences {
@@ -185,13 +185,25 @@ impl Comparison {
             }
             output::say_table(table)?;
         }
-        let same = output::counted(self.same, "parameter is the same", "parameters are the same");
-        match self.unjudged.len() {
-            0 => output::say(same),
-            several => output::say(format_args!(
-                "{same}; {several} not compared: the manual prints no number as their factory setting, or they could not be read"
-            )),
+        output::say(output::counted(self.same, "parameter is the same", "parameters are the same"))?;
+        for (why, codes) in self.not_compared() {
+            let counted = output::counted(codes.len(), "is", "are");
+            output::say(format_args!("{counted} not compared, {why}: {}", codes.join(", ")))?;
         }
+        Ok(())
+    }
+
+    /// What is not compared, by the reason.
+    fn not_compared(&self) -> Vec<(String, Vec<&'static str>)> {
+        let mut reasons: Vec<(String, Vec<&'static str>)> = Vec::new();
+        for difference in &self.unjudged {
+            let why = difference.why_unjudged();
+            match reasons.iter_mut().find(|(reason, _)| *reason == why) {
+                Some((_, codes)) => codes.push(difference.row.code),
+                None => reasons.push((why, vec![difference.row.code])),
+            }
+        }
+        reasons
     }
 
     fn json(&self, left: &str, right: &str) -> Value {
@@ -210,6 +222,9 @@ impl Comparison {
             "differences": differences.collect::<Vec<_>>(),
             "same": self.same,
             "not_compared": self.unjudged.len(),
+            "not_compared_because": self.not_compared().into_iter().map(|(why, codes)| {
+                json!({ "why": why, "mnemonics": codes })
+            }).collect::<Vec<_>>(),
         })
     }
 }
@@ -233,6 +248,17 @@ fn is_same(left: &Backup, right: &Backup, row: &Row, one: u16, other: u16) -> bo
         i64::from(unit.number(word)) * 10_i64.pow(u32::from(fine - unit.decimals))
     };
     counts(one_in, one) == counts(other_in, other)
+}
+
+impl Difference {
+    /// Why it is not compared.
+    fn why_unjudged(&self) -> String {
+        let unread = self.sides.iter().find_map(|side| match side {
+            Cell::Unread(why) => Some(why.clone()),
+            Cell::Holds(..) | Cell::Lacks => None,
+        });
+        unread.unwrap_or_else(|| "it is on one side only".to_owned())
+    }
 }
 
 impl Cell {
@@ -274,8 +300,80 @@ mod tests {
         let tenths = drive("a", "Inr = { raw = 1 }\nACC = { raw = 30 }\ndEC = { raw = 30 }");
         let hundredths = drive("b", "Inr = { raw = 0 }\nACC = { raw = 300 }\ndEC = { raw = 30 }");
         assert_eq!(codes(&tenths, &hundredths, false), ["Inr", "dEC"]);
-        let factory = Backup::of_factory(Family::ATV312);
+        let factory = Backup::of_factory(&tenths);
         assert_eq!(Comparison::of(&tenths, &factory, false).differences, []);
+    }
+
+    /// What differs from the factory setting, and what is not compared with it.
+    fn from_factory(lines: &str) -> (Vec<&'static str>, Vec<(String, Vec<&'static str>)>) {
+        let drive = drive("a", lines);
+        let mut comparison = Comparison::of(&drive, &Backup::of_factory(&drive), false);
+        let is_held = |row: &Row| drive.entries.iter().any(|entry| entry.row == row);
+        comparison.unjudged.retain(|unjudged| is_held(unjudged.row));
+        (
+            comparison.differences.iter().map(|difference| difference.row.code).collect(),
+            comparison.not_compared(),
+        )
+    }
+
+    /// BBV51701 p. 27 to 31: HSP, Ftd and FrS 50 Hz, with bFr = 60 60 Hz, tFr 60 and 72 Hz; p. 33, 42, 43, 45: rrS LI2, with tCC = 3C
+    /// LI3 and with LOC nO, PS2 LI3 and PS4 LI4, with 3C nO, JOG nO, with 3C LI4; p. 52: IPL YES, except for M2 nO.
+    #[test]
+    fn a_factory_setting_that_another_register_of_the_drive_chooses_is_compared_by_that() {
+        const FIFTY: &str = "bFr = { raw = 0 }\nHSP = { raw = 500 }\ntFr = { raw = 600 }\nFrS = { raw = 500 }\nFtd = { raw = 500 }";
+        const SIXTY: &str =
+            "HSP = { raw = 600 }\ntFr = { raw = 720 }\nFrS = { raw = 600 }\nFtd = { raw = 600 }";
+        assert_eq!(from_factory(FIFTY), (vec![], vec![]));
+        // bFr itself is 0 from the factory (p. 28).
+        assert_eq!(from_factory(&format!("bFr = {{ raw = 1 }}\n{SIXTY}")), (vec!["bFr"], vec![]));
+        let off = from_factory(&format!("bFr = {{ raw = 0 }}\n{SIXTY}"));
+        assert_eq!(off, (vec!["HSP", "Ftd", "FrS", "tFr"], vec![]));
+        let inputs = |tcc: u16, [rrs, ps2, ps4, jog]: [u16; 4]| {
+            from_factory(&format!(
+                "tCC = {{ raw = {tcc} }}\nrrS = {{ raw = {rrs} }}\nPS2 = {{ raw = {ps2} }}\nPS4 = {{ raw = {ps4} }}\nJOG = {{ raw = {jog} }}"
+            ))
+        };
+        assert_eq!(inputs(0, [130, 131, 132, 0]), (vec![], vec![]));
+        assert_eq!(inputs(0, [0, 0, 0, 132]), (vec!["rrS", "PS2", "PS4", "JOG"], vec![]));
+        assert_eq!(inputs(1, [131, 0, 0, 132]), (vec!["tCC"], vec![]));
+        assert_eq!(inputs(2, [0, 131, 132, 0]), (vec!["tCC"], vec![]));
+        let phases = |vcal: u16, ipl: u16| {
+            let head = "name = \"a\"\nfamily = \"atv312\"\nslave = 1\nline = \"l\"\ndate = \"d\"";
+            let text = format!(
+                "[drive]\n{head}\n[rating]\nVCAL = {{ raw = {vcal} }}\n[parameters]\nIPL = {{ raw = {ipl} }}"
+            );
+            let drive = Backup::parse(Path::new("x.toml"), &text).unwrap();
+            codes(&drive, &Backup::of_factory(&drive), false)
+        };
+        assert_eq!([phases(3, 1), phases(1, 0)], [[""; 0]; 2]);
+        assert_eq!([phases(3, 0), phases(1, 1)], [["IPL"]; 2]);
+    }
+
+    /// BBV51701 p. 28, 40: CLI 1.5 In and IdC 0.7 In, which are 6.15 and 2.87 A of 4.1 A; UnS by the rating, COd without one (p. 56).
+    #[test]
+    fn a_share_of_the_rating_is_compared_and_what_is_no_number_is_named_with_its_reason() {
+        let rated = |inv: &str, cli: u16, idc: u16| {
+            let lines = format!(
+                "CLI = {{ raw = {cli} }}\nIdC = {{ raw = {idc} }}\nUnS = {{ raw = 400 }}\nHSP = {{ raw = 420 }}"
+            );
+            from_factory(&format!("{lines}\n{inv}"))
+        };
+        let rating = "INV = { raw = 41 }";
+        let (by_rating, by_bfr) = (
+            ("the manual has a rule: by the drive's rating".to_owned(), vec!["UnS"]),
+            ("it depends on bFr, which is not known".to_owned(), vec!["HSP"]),
+        );
+        for cli in [61, 62] {
+            let unjudged = vec![by_bfr.clone(), by_rating.clone()];
+            assert_eq!(rated(rating, cli, 29), (vec![], unjudged));
+        }
+        assert_eq!(rated(rating, 50, 20).0, ["CLI", "IdC"]);
+        let (differences, unjudged) = rated("", 61, 29);
+        assert_eq!(differences, [""; 0]);
+        assert!(
+            unjudged.contains(&("it depends on INV, which is not known".to_owned(), vec!["CLI", "IdC"])),
+            "{unjudged:?}"
+        );
     }
 
     #[test]

@@ -170,7 +170,7 @@ async fn compared(daemon: Daemon, view: &DriveView) -> Result<Compared, String> 
     match held.nothing_read() {
         Some(why) => Err(why),
         None => {
-            let factory = Comparison::of(&held, &Backup::of_factory(held.head.family), true);
+            let factory = Comparison::of(&held, &Backup::of_factory(&held), true);
             Ok(Compared { held, factory })
         }
     }

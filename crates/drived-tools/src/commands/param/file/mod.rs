@@ -5,7 +5,7 @@ mod write;
 
 use drive_core::{
     Row,
-    registers::{Factory, Part, Place},
+    registers::{NoFactory, Part, Place},
 };
 use drive_families::Family;
 
@@ -78,17 +78,20 @@ impl Backup {
         brief(&self.row(row), word)
     }
 
-    /// What the manual prints as factory setting, as far as it prints numbers.
-    pub fn of_factory(family: Family) -> Self {
+    /// What the manual prints as factory setting for a drive that holds this: what depends on another register, as `bFr` or the
+    /// rating, by what that drive has there.
+    pub fn of_factory(side: &Self) -> Self {
+        let family = side.head.family;
         let capabilities = family.capabilities();
         let is_setting = |row: &&Row| is_kept(family, row) && row.access.is_writable();
-        let entries = capabilities.rows.iter().filter(is_setting).filter_map(|row| {
-            let held = match row.factory {
-                Factory::None => return None,
-                Factory::Value(word) => Ok(word),
-                Factory::Described(rule) => Err(format!("the manual has a rule: {rule}")),
+        let entries = capabilities.rows.iter().filter(is_setting).map(|row| {
+            let words = row.factory.words(|address| side.word(address));
+            // Of two to which a share may be rounded it is the one that the drive has.
+            let word = |[low, high]: [u16; 2]| match side.word(row.place()) {
+                Some(held) if held == low || held == high => held,
+                _ => high,
             };
-            Some(Entry { row, held })
+            Entry { row, held: words.map(word).map_err(|why| no_factory(side, why)) }
         });
         let head = Head {
             name: "factory".to_owned(),
@@ -101,6 +104,23 @@ impl Backup {
             date: String::new(),
         };
         Self { head, entries: entries.collect() }
+    }
+}
+
+/// Why there is no factory setting to compare with, in words.
+fn no_factory(side: &Backup, why: NoFactory) -> String {
+    let row =
+        |address: u16| side.head.family.capabilities().rows.iter().find(|row| row.place() == address.into());
+    let code = |address: u16| row(address).map_or("another register", |row| row.code);
+    match why {
+        NoFactory::NotPrinted => "the manual prints no factory setting".to_owned(),
+        NoFactory::Rule(rule) => format!("the manual has a rule: {rule}"),
+        NoFactory::Unknown(by) => format!("it depends on {}, which is not known", code(by)),
+        NoFactory::NoneFor(by, held) => {
+            let held = row(by).map_or_else(|| held.to_string(), |row| side.text(row, held));
+            format!("the manual prints no factory setting with {} {held}", code(by))
+        }
+        _ => "it has no number as factory setting".to_owned(),
     }
 }
 

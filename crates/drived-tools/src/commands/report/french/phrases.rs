@@ -32,6 +32,8 @@ pub(super) const PHRASES: &[(&str, &str)] = &[
     ("{} times", "{0} fois"),
     ("code {}, whose meaning is not known here", "code {0}, dont la signification n’est pas connue ici"),
     ("the manual has a rule: {s}", "règle : {0}"),
+    ("it depends on {s}, which is not known", "il dépend de {0}, qui n’est pas connu"),
+    ("the manual prints no factory setting with {s}", "le manuel n’imprime pas de réglage usine avec {0}"),
     ("{s}, with {r} = {r}: {s}, with {r} = {r}: {s}", "{0}, avec {1} = {2} : {3}, avec {4} = {5} : {6}"),
     ("{s}, with {r} = {r}: {s}", "{0}, avec {1} = {2} : {3}"),
     ("{s}, on {r}: {s}", "{0}, sur {1} : {2}"),
