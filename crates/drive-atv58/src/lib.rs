@@ -49,6 +49,8 @@ pub const CAPABILITIES: Capabilities = Capabilities {
     read_words: 63,
     write_words: 60,
     highest_address: 31,
+    // "Do not connect more than 28 stations on a bus" (p. 8).
+    stations: 28,
     speeds: &[4_800, 9_600, 19_200],
     formats: &[
         CharacterFormat::F8O1,

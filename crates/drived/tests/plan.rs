@@ -352,6 +352,12 @@ fn more_stations_than_a_family_allows_on_a_segment_are_refused() {
         "19 drives on 1 segment: atv28@1 is of the family Schneider Altivar 28, which allows 18 stations",
     );
     plan(&["--segments", "2"]).assert_done();
+    // VVDED397054 p. 8: not more than 28 stations on a bus.
+    let cards = |drives: &str| {
+        run(&["plan", "--line", "/dev/nowhere,19200,8O1", "--drive", drives, "--period", "5s"])
+    };
+    cards("atv58@1-28").assert_done();
+    cards("atv58@1-29").assert_refused(2, "which allows 28 stations");
     let wide = run(&["plan", "--line", "/dev/nowhere,19200,8E1", "--drive", "atv312@1-32", "--period", "5s"]);
     wide.assert_refused(2, "which allows 31 stations");
 }

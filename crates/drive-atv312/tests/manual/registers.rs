@@ -131,7 +131,7 @@ fn each_row_has_the_factory_setting_that_is_printed() {
             ("-", Factory::None) => {}
             (printed, Factory::Value(value)) => assert_eq!(printed.parse(), Ok(value), "{code}"),
             (printed, Factory::Described(_) | Factory::Chosen(..) | Factory::Percent(..)) => {
-                assert!(printed.parse::<u16>().is_err(), "{code}")
+                assert!(printed.parse::<u16>().is_err(), "{code}");
             }
             (printed, Factory::None) => panic!("{code}: {printed}"),
         }
