@@ -60,12 +60,11 @@ impl Desk {
             return self.broadcast_stop(ask);
         }
         let drive = self.drive(unit).filter(|_| self.config.rights.stop)?;
-        let stop = self.intents_without_reading(&drive, ask).find_map(|intent| match intent {
+        self.intents_without_reading(&drive, ask).find_map(|intent| match intent {
             Intent::Prepare(_) if stands(&drive) => None,
             Intent::ResetFaults(_) if stands(&drive) || shows_fault(&drive) => None,
             intent => intent.stops().map(|mode| Stop(intent, mode)),
-        });
-        stop
+        })
     }
 
     /// To whom a write to a unit goes.
