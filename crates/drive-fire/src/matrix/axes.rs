@@ -352,6 +352,21 @@ pub(super) fn parameter(subject: Subject) -> Option<&'static drive_core::registe
         .filter(|row| row.access.is_writable() && row.storage != Storage::Volatile)
 }
 
+/// What somebody may set at the keypad of a drive that stands, so that its command words do something else from then on.
+pub(super) fn settings(subject: Subject) -> &'static [&'static str] {
+    match subject.family().capabilities().key {
+        // A preset speed on bit 12 of CMD, another ramp on bit 11; no fast stop on bit 14; a normal stop that is a freewheel (BBV51701 p. 38 to 42).
+        "atv312" => &["PS2 172", "rPS 171", "FSt 0", "Stt 2"],
+        // The reference by the keypad, the command by the terminals (Modbus guide, 6.2).
+        "atv21" => &["FMOD 3", "CMOD 0"],
+        // No reverse (5.3).
+        "3g3ev" => &["n05 1"],
+        // Reference and run command by the terminals (B7 p. 342).
+        "wj200" | "mx2" => &["A001 1", "A002 1"],
+        _ => &[],
+    }
+}
+
 /// What happens to the drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Event {

@@ -3,9 +3,10 @@
 
 use std::{fmt, time::Instant};
 
+use drive_core::{Direction, StopMode};
 use fastrand::Rng;
 
-use super::{Event, FarEnd, Fault, Lived, Operation, Subject, Untold, Way, tell};
+use super::{Event, FarEnd, Fault, Lived, Operation, Subject, Untold, Way, axes::settings, tell};
 use crate::report::{Find, Told};
 
 /// What happens next.
@@ -17,6 +18,8 @@ pub enum Step {
     Strike(Fault, usize),
     /// This happens to the drive.
     Happens(Event),
+    /// Somebody sets this one of its settings at the keypad of a drive that stands: one that runs takes it not.
+    Sets(u8),
     /// The drive is asked for its status for so many seconds.
     Live(u8),
 }
@@ -49,7 +52,7 @@ impl Story {
         if subject.impossible_on(way).is_some() || far_end.impossible_on(way).is_some() {
             return None;
         }
-        let steps = (0..rng.usize(3..16)).map(|_| a_step(&mut rng, subject, way)).collect();
+        let steps = (0..rng.usize(3..16)).flat_map(|_| some_steps(&mut rng, subject, way)).collect();
         Some(Self { subject, way, far_end, steps })
     }
 
@@ -67,6 +70,7 @@ impl Story {
                 "o" => Step::Ask(*Operation::ALL.get(first)?),
                 "f" => Step::Strike(*Fault::ALL.get(first)?, second),
                 "e" => Step::Happens(*Event::ALL.get(first)?),
+                "s" => Step::Sets(first as u8),
                 "l" => Step::Live(first as u8),
                 _ => return None,
             })
@@ -132,6 +136,7 @@ impl fmt::Display for Story {
                 Step::Ask(operation) => write!(f, ".o{}", place(&Operation::ALL, operation))?,
                 Step::Strike(fault, behind) => write!(f, ".f{}x{behind}", place(Fault::ALL, fault))?,
                 Step::Happens(event) => write!(f, ".e{}", place(&Event::ALL, event))?,
+                Step::Sets(setting) => write!(f, ".s{setting}")?,
                 Step::Live(seconds) => write!(f, ".l{seconds}")?,
             }
         }
@@ -148,10 +153,38 @@ impl Story {
             Step::Ask(operation) => operation.to_string(),
             Step::Strike(fault, behind) => format!("{fault}, {behind} exchanges from here"),
             Step::Happens(event) => event.to_string(),
+            Step::Sets(setting) => {
+                format!(
+                    "set at the keypad: {}",
+                    settings(self.subject).get(usize::from(*setting)).unwrap_or(&"nothing")
+                )
+            }
             Step::Live(seconds) => format!("{seconds} s"),
         }));
         words.join("; ")
     }
+}
+
+/// What comes next: one step, or what a technician does, who stops the motor, sets something at the keypad, starts it and stops it again.
+fn some_steps(rng: &mut Rng, subject: Subject, way: Way) -> Vec<Step> {
+    let settings = settings(subject);
+    if settings.is_empty() || rng.u8(..24) > 0 {
+        return vec![a_step(rng, subject, way)];
+    }
+    let start = [Direction::Forward, Direction::Reverse][rng.usize(..2)];
+    let stop = StopMode::ALL[rng.usize(..StopMode::ALL.len())];
+    let asks = |operation: Operation| {
+        operation.impossible_for(subject, false).is_none().then_some(Step::Ask(operation))
+    };
+    let all = [
+        asks(Operation::Stop(StopMode::Ramp)),
+        Some(Step::Live(8)),
+        Some(Step::Sets(rng.u8(..settings.len() as u8))),
+        asks(Operation::Start(start)),
+        Some(Step::Live(rng.u8(1..9))),
+        asks(Operation::Stop(stop)),
+    ];
+    all.into_iter().flatten().collect()
 }
 
 fn a_step(rng: &mut Rng, subject: Subject, way: Way) -> Step {

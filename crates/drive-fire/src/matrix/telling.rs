@@ -8,6 +8,7 @@ use tokio::time::{Instant, sleep, timeout};
 
 use super::{
     Fault, Operation,
+    axes::settings,
     live::{Asks, Lived, PATIENCE, SETPOINT, against, is_of_before, operate, poll_for},
     stage::{Around, Site, Stage},
     story::{Step, Story},
@@ -49,6 +50,13 @@ pub(super) async fn tell(story: &Story, open: &Open) -> Lived {
                 if let Some((time, deed)) = later {
                     sleep(time).await;
                     around.happens(&deed);
+                }
+            }
+            Step::Sets(setting) => {
+                let setting = settings(subject).get(usize::from(setting));
+                if let Some(setting) = setting.filter(|_| !stage.bench.machine.observe().running) {
+                    done.touched = true;
+                    stage.happens(&format!("set {setting}"));
                 }
             }
             Step::Live(seconds) => poll_for(&mut stage, Duration::from_secs(seconds.into())).await,
