@@ -64,7 +64,7 @@ impl<P: Port> Drive for Atv21<P> {
         Ok(measurements)
     }
 
-    /// Reads FC90, FE10 to FE13 (the newest first) and FC91, one by one.
+    /// Reads FD01, FC90, FE10 to FE13 (the newest first), FC91 and FE79, one by one.
     async fn faults(&mut self) -> Result<Faults> {
         self.read_faults().await
     }

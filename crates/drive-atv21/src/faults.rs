@@ -2,7 +2,7 @@
 
 use drive_core::{Fault, FaultEntry};
 
-use crate::words::Alarms;
+use crate::words::{Alarms, MaintenanceAlarms};
 
 const CPU: &str = "switch the supply off and on; if it comes back, the drive needs service";
 
@@ -148,7 +148,11 @@ pub const FAULTS: &[FaultEntry] = &[
     ),
 ];
 
-/// FC91 as a list: the code of an alarm is the number of its bit, its mnemonic what the keypad blinks.
+/// What is added to the number of a bit of FE79.
+const MAINTENANCE: u16 = 16;
+
+/// FC91 and FE79 as a list (§8.7 p. 36): the code of an alarm is the number of its bit, from FE79 with 16 more, its mnemonic what the
+/// keypad blinks, or the bit of FE79.
 pub const ALARMS: &[FaultEntry] = &[
     FaultEntry::new(0, "C", "overcurrent alarm", "lengthen the ramp or reduce the load"),
     FaultEntry::new(1, "L", "overload of the drive", "reduce the load"),
@@ -158,7 +162,12 @@ pub const ALARMS: &[FaultEntry] = &[
     FaultEntry::new(5, "-", "undervoltage of the main circuit", "check the supply"),
     FaultEntry::new(7, "-", "undercurrent", "check the coupling to the load"),
     FaultEntry::new(8, "-", "overtorque", "look for a jam"),
-    FaultEntry::new(10, "-", "cumulative hours of operation reached", "plan the maintenance, read FE79"),
+    FaultEntry::new(
+        10,
+        "-",
+        "cumulative hours of operation reached",
+        "plan the maintenance; FE79 says of what",
+    ),
     FaultEntry::new(
         13,
         "MOFF",
@@ -172,13 +181,20 @@ pub const ALARMS: &[FaultEntry] = &[
         "automatic stop after falling to the lower limit again and again",
         "check reference and lower limit",
     ),
+    FaultEntry::new(16, "FE79.0", "the life of the fan is over", "replace the fan"),
+    FaultEntry::new(17, "FE79.1", "the life of the circuit board is over", "have the board replaced"),
+    FaultEntry::new(18, "FE79.2", "the life of the main capacitors is over", "have the capacitors replaced"),
+    FaultEntry::new(19, "FE79.3", "the alarm that the user has set up", "see what it was set up for"),
 ];
 
-/// The alarms of a word FC91, also the bits that the manual calls reserved.
+/// The alarms of a word FC91 and those of FE79, also the bits that the manual calls reserved.
 #[must_use]
-pub(crate) fn alarms(word: Alarms) -> Vec<Fault> {
-    let set = (0..16).filter(|bit| word.bits() & (1 << bit) != 0);
-    set.map(|bit| Fault::lookup(ALARMS, bit)).collect()
+pub(crate) fn alarms(word: Alarms, maintenance: MaintenanceAlarms) -> Vec<Fault> {
+    let set = |word: u16| (0..16).filter(move |bit| word & (1 << bit) != 0);
+    set(word.bits())
+        .chain(set(maintenance.bits()).map(|bit| MAINTENANCE + bit))
+        .map(|code| Fault::lookup(ALARMS, code))
+        .collect()
 }
 
 #[cfg(test)]
@@ -187,7 +203,7 @@ mod tests {
 
     #[test]
     fn an_alarm_bit_without_a_meaning_keeps_its_number() {
-        let found = alarms(Alarms::from_bits_retain(0b0000_0000_0100_0001));
+        let found = alarms(Alarms::from_bits_retain(0b0000_0000_0100_0001), MaintenanceAlarms::empty());
         assert_eq!(found.iter().map(|alarm| alarm.code).collect::<Vec<_>>(), [0, 6]);
         assert!(found[0].entry.is_some() && found[1].entry.is_none());
     }

@@ -166,7 +166,9 @@ impl<P: Port> Atv21<P> {
             history.extend(code.and_then(fault));
         }
         let alarm = self.optional(Class::Background, map::ALARM_CODE).await?.unwrap_or(0);
-        let warnings = alarms(Alarms::from_bits_retain(alarm));
+        let maintenance = self.optional(Class::Background, map::MAINTENANCE_ALARM).await?.unwrap_or(0);
+        let maintenance = MaintenanceAlarms::from_bits_retain(maintenance);
+        let warnings = alarms(Alarms::from_bits_retain(alarm), maintenance);
         Ok(Faults { present: present.into_iter().collect(), history, warnings, tripped, reset_allowed: None })
     }
 

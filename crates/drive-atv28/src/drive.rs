@@ -55,13 +55,16 @@ impl<P: Port> Drive for Atv28<P> {
         }
         let word = |row: &Row| raw.iter().find(|word| word.address == row.address).map(|word| word.value);
         let signed = |row| word(row).map(u16::cast_signed);
+        // Whether torque and power have a sign is not printed of the twin either (BBV51701 p. 21): a word that would be negative is left
+        // to the raw words.
+        let driving = |row| signed(row).filter(|word| *word >= 0).map(Percent::from_percent);
         let iolr = word(IOLR.row());
         Ok(Measurements {
             reference: word(FRH.row()).map(|word| Frequency::from_decihertz(word).into()),
             speed: signed(RFRD.row()).map(|rpm| Speed::from_rpm(u32::from(rpm.unsigned_abs()))),
             line_voltage: word(ULN.row()).map(|word| Voltage::from_decivolts(u32::from(word))),
-            torque: signed(OTR.row()).map(Percent::from_percent),
-            power_share: signed(OPR.row()).map(Percent::from_percent),
+            torque: driving(OTR.row()),
+            power_share: driving(OPR.row()),
             drive_thermal: word(THD.row()).map(percent),
             motor_thermal: word(THR.row()).map(percent),
             running_time: word(RTH.row()).map(|hours| Duration::from_secs(u64::from(hours) * 3_600)),

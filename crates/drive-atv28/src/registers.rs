@@ -86,8 +86,8 @@ registers! {
     DP4: Read(468, "DP4", "past fault 4", Unknown, Unit::CODE, Range::OneOf(lists::LFT), Factory::None, Elsewhere, "BBV51701 p. 57; twin W7204, p. 24");
     IOLR: ReadWrite(478, "IOLR", "logic inputs and outputs", Volatile, Unit::BITS, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 57; twin W5240, p. 23");
     AO1R: ReadWrite(482, "AO1R", "analog output", Volatile, Unit::COUNT, Range::Within(0, 10_000), Factory::None, Elsewhere, "BBV51701 p. 57; twin W5261, p. 23");
-    OTR: Read(487, "Otr", "motor torque", Volatile, Unit::scaled("%", 0).signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 57; twin W3205, p. 21");
-    OPR: Read(491, "OPr", "motor power", Volatile, Unit::scaled("%", 0).signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 57; twin W3211, p. 21");
+    OTR: Read(487, "Otr", "motor torque", Volatile, Unit::scaled("%", 0).sign_not_printed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 57; twin W3205, p. 21");
+    OPR: Read(491, "OPr", "motor power", Volatile, Unit::scaled("%", 0).sign_not_printed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 57; twin W3211, p. 21");
     RTH: Read(530, "rtH", "operating time", Unknown, Unit::scaled("h", 0), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 57; twin W3231, p. 21");
     INV: Read(555, "INV", "nominal current of the drive", Volatile, Unit::scaled("A", 1), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 57; twin W3017, p. 26");
     ERRD: Read(600, "ERRD", "DSP402 error code", Volatile, Unit::CODE, Range::OneOf(lists::ERRD), Factory::None, Elsewhere, "BBV51701 p. 57; twin W8606, p. 17");

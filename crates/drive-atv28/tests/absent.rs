@@ -83,6 +83,19 @@ async fn each_measurement_and_each_fault_stands_for_itself() {
     }
 }
 
+/// BBV51701 p. 21 prints "1%" of the twin's `Otr` and `OPr`, and no sign.
+#[tokio::test(start_paused = true)]
+async fn a_torque_and_a_power_of_which_the_sign_is_not_printed_are_left_raw() {
+    for (word, shown) in [(100, Some(100)), (0x7FFF, Some(0x7FFF)), (0x8000, None), (0xFFFF, None)] {
+        let words = Words::new(&CAPABILITIES, &[(487, word), (491, word)]);
+        let mut drive = Atv28::new(words, 1.try_into().unwrap());
+        let measured = drive.measurements().await.unwrap();
+        let shown = shown.map(drive_core::Percent::from_percent);
+        assert_eq!((measured.torque, measured.power_share), (shown, shown), "{word:04X}h");
+        assert!([487, 491].iter().all(|address| measured.raw.iter().any(|raw| raw.address == *address)));
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_motor_is_started_and_given_its_setpoint_without_the_speeds_and_without_its_limits() {
     for missing in [603, 604, 250, 251] {

@@ -190,6 +190,12 @@ fn warnings(words: StatusWords, lrs1: ExtendedStatus1) -> Vec<Fault> {
         (eti.contains(ExtendedStatus::MOTOR_THERMAL_ALARM), 7),
         (eti.contains(ExtendedStatus::BRAKING_ALARM), 8),
         (eti.contains(ExtendedStatus::CURRENT_LIMIT), 11),
+        // The same alarm in the other word, told once.
+        (
+            lrs1.contains(ExtendedStatus1::MOTOR_THERMAL_ALARM)
+                && !eti.contains(ExtendedStatus::MOTOR_THERMAL_ALARM),
+            24,
+        ),
         (lrs1.contains(ExtendedStatus1::SIGNAL_LOST), 28),
         (lrs1.contains(ExtendedStatus1::DRIVE_THERMAL_ALARM), 30),
     ]

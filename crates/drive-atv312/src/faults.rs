@@ -137,6 +137,7 @@ pub const WARNINGS: &[FaultEntry] = &[
     FaultEntry::new(7, "ETI.7", "motor thermal overload alarm", "lower the load before OLF trips"),
     FaultEntry::new(8, "ETI.8", "excessive braking", "lengthen the deceleration before ObF trips"),
     FaultEntry::new(11, "ETI.11", "current limit", "check load, ramps and CLI"),
+    FaultEntry::new(24, "LRS1.8", "motor thermal overload alarm", "lower the load before OLF trips"),
     FaultEntry::new(
         28,
         "LRS1.12",

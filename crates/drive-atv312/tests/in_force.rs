@@ -482,3 +482,14 @@ async fn nothing_is_set_and_nothing_starts_while_the_drive_saves_its_parameters(
     assert!(reason.contains("ETI bit 0"), "{refused}");
     assert!(commands(drive).is_empty());
 }
+
+/// LRS1 bit 8 and ETI bit 7: "motor thermal overload alarm" (BBV51701 p. 22).
+#[tokio::test(start_paused = true)]
+async fn a_motor_thermal_alarm_is_told_once_from_whichever_word_shows_it() {
+    for (eti, lrs1) in [(0x4002, 1 << 8), (0x4082, 0), (0x4082, 1 << 8)] {
+        let mut drive = drive(&[&FOR_THE_BUS, &[(3201, 0x02C0), (3206, eti), (3250, lrs1)]]);
+        let warnings = drive.faults().await.unwrap().warnings;
+        let told: Vec<_> = warnings.iter().map(|alarm| alarm.entry.unwrap().meaning).collect();
+        assert_eq!(told, ["motor thermal overload alarm"], "ETI {eti:04X}h, LRS1 {lrs1:04X}h");
+    }
+}

@@ -283,7 +283,7 @@ impl fmt::Display for Quantity {
 pub fn numbers(capabilities: &Capabilities) -> BTreeSet<u16> {
     let is_number = |row: &&drive_core::Row| {
         row.space == Space::HoldingRegister
-            && row.unit.form == Form::Number
+            && matches!(row.unit.form, Form::Number | Form::SignNotPrinted)
             && row.unit != Unit::COUNT
             && row.range.choices().is_empty()
     };

@@ -190,7 +190,7 @@ async fn a_trip_is_told_with_its_history_and_what_was_before_it() {
     let faults = drive.faults().await.unwrap();
     assert_eq!(faults.present.iter().map(Fault::mnemonic).collect::<Vec<_>>(), ["OP2"]);
     assert_eq!(faults.history.iter().map(|fault| fault.code).collect::<Vec<_>>(), [11, 999]);
-    assert_eq!(faults.warnings.iter().map(|alarm| alarm.code).collect::<Vec<_>>(), [4, 6]);
+    assert_eq!(faults.warnings.iter().map(|alarm| alarm.code).collect::<Vec<_>>(), [4, 6, 16, 18]);
     let trip = drive.last_trip().await.unwrap();
     assert_eq!((trip.fault.unwrap().code, trip.output_frequency), (11, HALF_SPEED));
     assert!(trip.status.contains(StatusWord::RUN | StatusWord::STANDBY));
@@ -235,4 +235,18 @@ async fn no_status_word_and_no_garbage_makes_it_panic() {
         assert_eq!(status.is_fault(), word & 2 != 0);
         assert_eq!(drive.faults().await.unwrap().warnings.len(), word.count_ones() as usize);
     }
+}
+
+/// FE79: bit 0 fan, 1 circuit board, 2 capacitors, 3 set up by the user (§8.7 p. 36).
+#[tokio::test(start_paused = true)]
+async fn what_is_due_for_maintenance_stands_among_the_alarms() {
+    let (rig, mut drive) = Rig::factory();
+    for (bit, part) in [(0, "fan"), (1, "circuit board"), (2, "capacitors"), (3, "user")] {
+        rig.machine.poke(0xFE79, 1 << bit);
+        let warnings = drive.faults().await.unwrap().warnings;
+        let [alarm] = *warnings else { panic!("{warnings:?}") };
+        assert!(alarm.entry.is_some_and(|entry| entry.meaning.contains(part)), "{alarm:?}");
+    }
+    rig.machine.poke(0xFE79, 0);
+    assert_eq!(drive.faults().await.unwrap().warnings, []);
 }

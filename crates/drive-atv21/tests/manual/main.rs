@@ -164,7 +164,9 @@ fn the_bits_of_every_word_are_those_of_8_4_8_6_8_7_8_8() {
         assert_eq!(CommandWord::from_bits_retain(0xC400 | number).preset_speed(), number);
     }
     let listed: Vec<u16> = ALARMS.iter().map(|alarm| alarm.code).collect();
-    let named: Vec<u16> = (0..16).filter(|bit| Alarms::all().bits() & (1 << bit) != 0).collect();
+    let named = |word: u16| (0..16).filter(move |bit| word & (1 << bit) != 0);
+    let maintenance = named(MaintenanceAlarms::all().bits()).map(|bit| 16 + bit);
+    let named: Vec<u16> = named(Alarms::all().bits()).chain(maintenance).collect();
     assert_eq!(listed, named);
 }
 

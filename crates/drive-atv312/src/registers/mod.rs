@@ -62,8 +62,8 @@ registers! {
     RFR: Read(3202, "rFr", "output frequency applied to the motor (signed value); with CMI bit 9: 32767 for 600 Hz", Volatile, HZ.signed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
     FRH: Read(3203, "FrH", "frequency reference before ramp (absolute value)", Volatile, HZ, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
     LCR: Read(3204, "LCr", "current in the motor", Volatile, AMPERE, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
-    OTR: Read(3205, "Otr", "motor torque", Volatile, PERCENT, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
-    OPR: Read(3211, "OPr", "motor power", Volatile, PERCENT, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
+    OTR: Read(3205, "Otr", "motor torque", Volatile, PERCENT.sign_not_printed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
+    OPR: Read(3211, "OPr", "motor power", Volatile, PERCENT.sign_not_printed(), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
     ULN: Read(3207, "ULn", "line voltage", Volatile, Unit::scaled("V", 1), Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
     THD: Read(3209, "tHd", "drive thermal state", Volatile, PERCENT, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
     TDM: Read(3210, "TDM", "max. thermal state reached by the drive", Volatile, PERCENT, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 21");
@@ -78,7 +78,8 @@ registers! {
     AI1C: Read(5242, "AI1C", "value of analog input AI1", Volatile, Unit::scaled("mV", 0), Range::Within(0, 10_000), Factory::None, Elsewhere, "BBV51701 p. 23");
     AI2C: Read(5243, "AI2C", "value of analog input AI2", Volatile, Unit::scaled("mV", 0).signed(), Range::Within(-10_000, 10_000), Factory::None, Elsewhere, "BBV51701 p. 23");
     AI3C: Read(5244, "AI3C", "value of analog input AI3", Volatile, Unit::scaled("µA", 0), Range::Within(0, 20_000), Factory::None, Elsewhere, "BBV51701 p. 23");
-    AIV1: Read(5281, "AIV1", "value of the analog input image", Volatile, PERCENT, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 23");
+    // "Unit: %, variation range: 0.1 to 100%": what a count is, is not printed.
+    AIV1: Read(5281, "AIV1", "value of the analog input image, 0.1 to 100 % in counts of a size that is not printed", Volatile, registers::Unit::COUNT, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 23");
     LFT: Read(7121, "LFt", "last detected fault", Volatile, Unit::CODE, Range::OneOf(FAULT_CODES), Factory::None, Elsewhere, "BBV51701 p. 24");
     CNF: Read(7132, "CNF", "communication option detected fault", Volatile, Unit::COUNT, Range::Any, Factory::None, Elsewhere, "BBV51701 p. 24");
     DP1: Read(7201, "DP1", "past detected fault No. 1", Volatile, Unit::CODE, Range::OneOf(FAULT_CODES), Factory::None, Elsewhere, "BBV51701 p. 24");

@@ -96,6 +96,8 @@ fn each_row_has_the_unit_that_is_printed() {
             // Printed for the factory's Inr; with another "ramps of 0.05 to 327.6 s" or "1 to 32760 s" (p. 38, 39).
             "0.1 s" if ["ACC", "dEC", "AC2", "dE2"].contains(&line.code) => ("× Inr", 0),
             "1" => ("", 0),
+            // "%" and a range of 0.1 to 100 %: a count is one or the other.
+            "%" if line.code == "AIV1" => ("", 0),
             "%" | "1%" => ("%", 0),
             "0.1%" => ("%", 1),
             "1 Hour" => ("h", 0),
@@ -119,6 +121,16 @@ fn a_ramp_is_shown_in_steps_of_inr_because_only_inr_tells_how_long_a_step_is() {
         assert_eq!(row(address).read("3.0 s"), None, "W{address}");
         assert_eq!(row(address).read("30"), Some(30), "W{address}");
     }
+}
+
+/// p. 21 prints "1%" and no sign; p. 23 a percentage without the size of a count.
+#[test]
+fn a_word_is_no_percentage_where_its_sign_or_its_count_is_not_printed() {
+    for address in [3205, 3211] {
+        let shown = [150, 0x7FFF, 0x8000, 0xFFFF].map(|word| row(address).show(word));
+        assert_eq!(shown, ["150 %", "32767 %", "8000h", "FFFFh"], "W{address}");
+    }
+    assert_eq!(row(5281).show(1_000), "1000");
 }
 
 #[test]

@@ -244,6 +244,13 @@ mod tests {
     }
 
     #[test]
+    fn a_word_of_which_the_sign_is_not_printed_is_a_number_only_where_it_would_be_the_same_with_one() {
+        let unit = Unit::scaled("%", 0).sign_not_printed();
+        let shown = [0, 0x7FFF, 0x8000, 0xFFFF].map(|word| unit.show(word));
+        assert_eq!(shown, ["0 %", "32767 %", "8000h", "FFFFh"]);
+    }
+
+    #[test]
     fn a_listed_value_is_shown_with_its_meaning_and_read_by_its_mnemonic() {
         assert_eq!(SLL.row().show(1), "1 YES (freewheel)");
         assert_eq!(SLL.row().read("YES"), Some(1));

@@ -26,6 +26,8 @@ pub enum Form {
     Code,
     /// As a decimal number in the unit, of which 32767 points are so many: "resolution 32767 points = 600 Hz".
     Points(u16),
+    /// As a decimal number in the unit below 8000h, and above as bits: whether the word has a sign is not printed.
+    SignNotPrinted,
 }
 
 /// How many points a full scale has.
@@ -51,6 +53,22 @@ impl Unit {
         Self { signed: true, ..self }
     }
 
+    /// The same for a word of which the manual does not say whether it has a sign.
+    #[must_use]
+    pub const fn sign_not_printed(self) -> Self {
+        Self { form: Form::SignNotPrinted, ..self }
+    }
+
+    /// Whether a word is shown as a number.
+    #[must_use]
+    pub const fn is_number(self, word: u16) -> bool {
+        match self.form {
+            Form::Number | Form::Points(_) => true,
+            Form::SignNotPrinted => word < 0x8000,
+            Form::Bits | Form::Code => false,
+        }
+    }
+
     /// A number with `decimals` places in the unit `symbol`, of which 32767 counts are `full`.
     #[must_use]
     pub const fn points(symbol: &'static str, decimals: u8, full: u16) -> Self {
@@ -66,7 +84,7 @@ impl Unit {
                 let whole = number * i64::from(full) * 10_i64.pow(self.decimals.into());
                 (whole + whole.signum() * POINTS / 2) / POINTS
             }
-            Form::Number | Form::Bits | Form::Code => number,
+            Form::Number | Form::SignNotPrinted | Form::Bits | Form::Code => number,
         }
     }
 
@@ -80,7 +98,7 @@ impl Unit {
     #[must_use]
     pub fn show(self, word: u16) -> String {
         let mut text = String::new();
-        if self.form == Form::Bits {
+        if self.form == Form::Bits || self.form == Form::SignNotPrinted && !self.is_number(word) {
             return format!("{word:04X}h");
         }
         // Writing into a String does not fail.
@@ -110,7 +128,7 @@ impl Unit {
                 let whole = number.checked_mul(POINTS)?;
                 (whole + whole.signum() * full / 2) / full
             }
-            Form::Points(_) | Form::Number | Form::Bits | Form::Code => number,
+            Form::Points(_) | Form::Number | Form::SignNotPrinted | Form::Bits | Form::Code => number,
         };
         if self.signed {
             i16::try_from(number).ok().map(i16::cast_unsigned)

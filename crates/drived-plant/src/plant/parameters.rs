@@ -9,7 +9,7 @@ use std::{
 
 use drive_core::{
     Capabilities, Error, ErrorKind, Row, Written,
-    registers::{Access, Form, Place, Space, Storage},
+    registers::{Access, Place, Space, Storage},
 };
 use drive_fleet::{DriveHandle, Refused};
 use schemars::JsonSchema;
@@ -155,13 +155,13 @@ impl ParameterView {
 
 impl ValueView {
     fn of(row: &Row, raw: u16) -> Self {
-        match (row.choice(raw), row.unit.form) {
-            (Some(choice), _) => Self::Text(choice.code.to_owned()),
-            (None, Form::Number | Form::Points(_)) => {
+        match row.choice(raw) {
+            Some(choice) => Self::Text(choice.code.to_owned()),
+            None if row.unit.is_number(raw) => {
                 let step = 10_f64.powi(i32::from(row.unit.decimals));
                 Self::Number(row.unit.shown(raw) as f64 / step)
             }
-            (None, Form::Bits | Form::Code) => Self::Text(row.unit.show(raw)),
+            None => Self::Text(row.unit.show(raw)),
         }
     }
 }
