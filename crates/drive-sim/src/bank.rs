@@ -1,6 +1,6 @@
 //! The registers of a simulated drive: RAM, the EEPROM image behind it, and the rules of each row.
 
-use drive_core::registers::{Access, Factory, Row, Storage};
+use drive_core::registers::{Access, Factory, Range, Row, Storage};
 
 use crate::model::Exception;
 
@@ -146,7 +146,9 @@ impl Bank {
             Access::WriteStopped if !stopped => return Err(Refusal::Running),
             Access::WriteStopped | Access::ReadWrite | Access::Write => {}
         }
-        if row.range.allows(row.unit.number(value)) { Ok(()) } else { Err(Refusal::Range) }
+        // What a drive does with a bit that nobody may write is printed nowhere: this one takes the word.
+        let is_allowed = matches!(row.range, Range::Bits(_)) || row.range.allows(row.unit.number(value));
+        if is_allowed { Ok(()) } else { Err(Refusal::Range) }
     }
 
     /// Writes a register as the line does: into RAM, and into EEPROM where the row says that each write goes there
