@@ -44,7 +44,7 @@ const fn free_output(bit: u16, function: u16) -> Limit {
         registers: &[IOLR],
         by: function,
         allows: Allows::BitsOfUnassigned(bit),
-        why: "an output is written only while no function has it (BBV51701 p. 20)",
+        why: "a write only while no function has the output (BBV51701 p. 20)",
     }
 }
 
@@ -219,7 +219,7 @@ pub(crate) const RESTORING: Restoring = Restoring {
             registers: &[AO1R],
             by: DO,
             allows: Allows::Unassigned,
-            why: "it is written only while dO is not assigned (BBV51701 p. 20)",
+            why: "a write only while dO is not assigned (BBV51701 p. 20)",
         },
     ],
     control: &[CHCF, CD2, CD1, CCS, COP],
