@@ -59,6 +59,14 @@ impl InFile {
     fn open(&self) -> Result<History, PastError> {
         Ok(History::open(&self.path)?)
     }
+
+    /// The same, for what was up to a moment: values wait for up to a minute to be written, and what is known is told as known.
+    fn open_up_to(&self, to_unix_ms: i64) -> Result<History, PastError> {
+        if wall_ms().saturating_sub(to_unix_ms) <= FLUSHED_EVERY_MS {
+            self.inbox.have_written(WRITTEN_WITHIN);
+        }
+        self.open()
+    }
 }
 
 /// The quantity of a name.
@@ -107,7 +115,7 @@ impl Past for InFile {
     fn values(&self, asked: &ValuesAsked, given_up: &GivenUp) -> Result<ValuesView, PastError> {
         let ValuesAsked { drive, value, from_unix_ms, to_unix_ms, every_ms } = asked;
         let quantity = named(value)?;
-        let history = self.open()?;
+        let history = self.open_up_to(*to_unix_ms)?;
         let mut view = ValuesView {
             drive: drive.clone(),
             value: value.clone(),
@@ -145,7 +153,7 @@ impl Past for InFile {
             let text = "expected a value at least, every_ms from 1 on, and a time that ends after it begins";
             return Err(PastError::Asked(text.to_owned()));
         }
-        let history = self.open()?;
+        let history = self.open_up_to(*to_unix_ms)?;
         let drives = meant(&history, &asked.drives)?;
         let first = from_unix_ms - from_unix_ms.rem_euclid(*every_ms);
         let steps = usize::try_from((to_unix_ms - first) / every_ms + 1).unwrap_or(usize::MAX);
@@ -195,7 +203,7 @@ impl Past for InFile {
     }
 
     fn moment(&self, at_unix_ms: i64, given_up: &GivenUp) -> Result<MomentView, PastError> {
-        let history = self.open()?;
+        let history = self.open_up_to(at_unix_ms)?;
         let mut drives = Vec::new();
         for drive in read::drives(&history.0)? {
             is_waited_for(given_up)?;
@@ -219,10 +227,7 @@ impl Past for InFile {
 
     fn days(&self, asked: &DaysAsked, given_up: &GivenUp) -> Result<Vec<DayView>, PastError> {
         // Of a drive that has just been added all of it may wait to be written.
-        if wall_ms() - asked.to_unix_ms <= FLUSHED_EVERY_MS {
-            self.inbox.have_written(WRITTEN_WITHIN);
-        }
-        let history = self.open()?;
+        let history = self.open_up_to(asked.to_unix_ms)?;
         let (since, until) = read::bounds(&history.0)?;
         let (Some(since), Some(until)) = (since, until) else { return Ok(Vec::new()) };
         let (from, to) = (asked.from_unix_ms.max(since), asked.to_unix_ms.min(until));
@@ -297,10 +302,8 @@ impl Past for InFile {
     }
 
     fn story(&self, drive: &str, at_unix_ms: i64) -> Result<StoryView, PastError> {
-        if wall_ms() - at_unix_ms <= story::LOOKED_AFTER_MS + FLUSHED_EVERY_MS {
-            self.inbox.have_written(WRITTEN_WITHIN);
-        }
-        Ok(story::tell(&self.open()?.0, drive, at_unix_ms)?)
+        let history = self.open_up_to(at_unix_ms.saturating_add(story::LOOKED_AFTER_MS))?;
+        Ok(story::tell(&history.0, drive, at_unix_ms)?)
     }
 
     fn note(&self, read: ParameterRead) {

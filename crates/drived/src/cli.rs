@@ -160,7 +160,7 @@ impl Command {
             Self::Token(command) => token::run(command).await,
             Self::Audit(command) => audit::run(command),
             #[cfg(feature = "history")]
-            Self::History(args) => history::run(&args),
+            Self::History(args) => history::run(&args).await,
             #[cfg(feature = "history")]
             Self::Why(args) => why::run(&args).await,
             #[cfg(not(feature = "history"))]

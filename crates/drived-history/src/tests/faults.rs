@@ -3,12 +3,16 @@
 use std::{fs, os::unix::fs::PermissionsExt as _, time::Duration};
 
 use drived_config::testing::Folder;
-use drived_plant::plant::past::{ParameterRead, Past, PastError, RecordView, RecordsAsked};
+use drived_plant::plant::past::{
+    CurvesAsked, GivenUp, ParameterRead, Past, PastError, RecordView, RecordsAsked, ValuesAsked,
+};
 use rusqlite::Connection;
 use tokio::sync::watch;
 
 use super::{BEGIN_MS, Pump, event, moment};
 use crate::{
+    clocks::Clocks,
+    past::InFile,
     quantity::{Quantity, Set},
     read::{self, Filter, History, records},
     record::{Moment, Setting},
@@ -477,6 +481,59 @@ async fn what_was_read_within_the_minute_is_there_for_whoever_asks() {
     thread.join().unwrap();
     // Behind its end nobody is waited for: this would hang for three seconds, and tell nothing.
     assert_eq!(words(&History::open(&path).unwrap().0), ["began", "ended"]);
+}
+
+#[tokio::test]
+async fn values_of_the_last_minute_are_known_to_whoever_asks_for_them() {
+    type Asks = fn(&InFile, i64) -> bool;
+    let curve: Asks = |past, at| {
+        let asked = CurvesAsked {
+            drives: vec!["pump".to_owned()],
+            values: vec!["state".to_owned()],
+            from_unix_ms: at - 500,
+            to_unix_ms: at + 500,
+            every_ms: 1_000,
+        };
+        let told = past.curves(&asked, &GivenUp::default()).unwrap();
+        told.curves.iter().any(|curve| curve.known.iter().any(|known| *known > 0.0))
+    };
+    let values: Asks = |past, at| {
+        let (drive, value) = ("pump".to_owned(), "state".to_owned());
+        let asked =
+            ValuesAsked { drive, value, from_unix_ms: at - 500, to_unix_ms: at + 500, every_ms: None };
+        !past.values(&asked, &GivenUp::default()).unwrap().points.is_empty()
+    };
+    let moment: Asks = |past, at| {
+        let told = past.moment(at, &GivenUp::default()).unwrap();
+        told.drives.iter().any(|drive| drive.values.contains_key("state"))
+    };
+    let folder = Folder::new("history-last-minute");
+    for (name, asks) in [("curves", curve), ("values", values), ("moment", moment)] {
+        let (path, clocks) = (folder.file(name), Clocks::begin());
+        let (health, mut seen) = watch::channel(Health::Opening);
+        let (inbox, limits) = (Inbox::default(), Limits::default());
+        let writer = Writer {
+            path: path.clone(),
+            limits,
+            inbox: inbox.clone(),
+            clock: move || clocks.now(),
+            health,
+            is_anew: false,
+        };
+        let thread = writer.start().unwrap();
+        becomes(&mut seen, |health| *health == Health::Writing).await;
+        let (mut tracker, now) = (Tracker::default(), clocks.now());
+        for before in [3_000, 2_000, 1_000] {
+            let seen = tracker.see(now.steady_ms - before, 3_000, &[(Quantity::STATE, 3)]);
+            let shown = seen.map(|seen| Shown { drive: "pump".into(), set: Set::Status, seen });
+            inbox.show(shown.unwrap()).unwrap();
+        }
+        let past = InFile { path, limits, inbox: inbox.clone(), clocks, done: std::sync::Arc::default() };
+        let at = now.wall_ms - 2_000;
+        assert!(tokio::task::spawn_blocking(move || asks(&past, at)).await.unwrap(), "{name}");
+        inbox.end();
+        thread.join().unwrap();
+    }
 }
 
 #[tokio::test]

@@ -89,15 +89,20 @@ const SHOWN: [Quantity; 5] =
 const ROWS: i64 = 40;
 /// So far back is told where nothing is said.
 const HALF_AN_HOUR_MS: i64 = 1_800_000;
+/// What ends no longer ago than this may not be written yet.
+const LAST_MS: i64 = 60_000;
 /// So many steps at the most, whoever reads them.
 const STEPS: i64 = 1_000_000;
 
-pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+pub(crate) async fn run(args: &Args) -> Result<(), Failure> {
     let now = Local::now().timestamp_millis();
     let moment = |text: &Option<String>| text.as_deref().map(moment_of).transpose();
     let lasts = args.lasts.map(|Time(lasts)| i64::try_from(lasts.as_millis()).unwrap_or(i64::MAX));
     let (from, to) = meant(now, moment(&args.from)?, moment(&args.to)?, lasts);
     let quantities = args.values.iter().map(|name| named(name)).collect::<Result<Vec<_>, _>>()?;
+    if now.saturating_sub(to) <= LAST_MS {
+        args.place.have_written(&args.name, to.min(now)).await?;
+    }
     let history = args.place.open(&args.name)?;
     if args.csv {
         csv_head(args.every.is_some())?;
