@@ -5,6 +5,7 @@ use std::{fmt, path::PathBuf, sync::Arc, time::Duration};
 
 use drive_fleet::alarms::{Alarm, AlarmKind};
 use drived_face::Plant;
+use drived_plant::plant::past::RecordView;
 use rusqlite::Connection;
 use serde::Deserialize;
 use tokio::{sync::Notify, time::timeout};
@@ -57,6 +58,27 @@ fn after(hours: Option<u32>, starts: Option<u32>) -> String {
 #[derive(Debug, Deserialize)]
 struct Done {
     part: String,
+}
+
+/// How the event is called by which a drive is called otherwise,
+const RENAMED: &str = "renamed";
+/// and so many names of one it is followed through.
+const NAMES: usize = 64;
+
+/// What it was called before.
+#[derive(Debug, Deserialize)]
+struct Renamed {
+    was: String,
+}
+
+/// A name of a drive, and from when to when it was its name: by the wall's clock, and by the records between which it was.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Called {
+    name: String,
+    from_ms: i64,
+    to_ms: i64,
+    after: i64,
+    before: i64,
 }
 
 /// The record that something was done.
@@ -178,19 +200,30 @@ impl Count {
         let (Some(first), Some(last)) = bounds(connection)? else { return Ok(()) };
         let newest = connection.query_row("SELECT max(id) FROM record", [], |row| row.get(0))?;
         // Records that are fewer than they were are those of a file that was begun anew.
-        let seen = if newest < self.seen { 0 } else { self.seen };
-        let done = last_done(connection, &self.maintained, seen)?;
+        let mut seen = if newest < self.seen { 0 } else { self.seen };
+        let mut called = called(connection, &self.maintained.drive, seen)?;
+        if seen > 0 && called.len() > 1 {
+            // It has this name since it was counted last: what it did before belongs to it, and what another of this name did does not.
+            *self = Self::new(self.maintained.clone());
+            (seen, called) = (0, self::called(connection, &self.maintained.drive, 0)?);
+        }
+        let done = last_done(connection, &self.maintained.part, &called, seen)?;
         let is_just_done = done.is_some() && self.seen > 0;
         if let Some(at) = done {
             *self = Self { until: at, done, ..Self::new(self.maintained.clone()) };
         }
         (self.seen, self.is_just_done) = (newest, is_just_done);
-        let Ran { running_ms, starts, until } =
-            ran(connection, &self.maintained.drive, self.until.max(first), last)?;
-        self.running_ms += running_ms;
-        self.starts += starts;
-        // It is counted on from the moment of which something was known last.
-        self.until = self.until.max(until.saturating_sub(1));
+        for Called { name, from_ms, to_ms, .. } in called.iter().rev() {
+            let (from, to) = (self.until.max(first).max(*from_ms), last.min(*to_ms));
+            if from > to {
+                continue;
+            }
+            let Ran { running_ms, starts, until } = ran(connection, name, from, to)?;
+            self.running_ms += running_ms;
+            self.starts += starts;
+            // It is counted on from the moment of which something was known last.
+            self.until = self.until.max(until.saturating_sub(1));
+        }
         Ok(())
     }
 
@@ -234,24 +267,67 @@ fn why(part: &str, hours: Option<u32>, starts: Option<u32>) -> String {
     format!("{part}, after {}", after(hours, starts))
 }
 
-/// When something was done last, of what is told behind a record.
-fn last_done(connection: &Connection, of: &Maintained, after: i64) -> Result<Option<i64>, StoreError> {
+/// What a drive is called and was called, as far as it is told behind a record: the newest name first.
+fn called(connection: &Connection, drive: &str, after: i64) -> Result<Vec<Called>, StoreError> {
+    let mut all =
+        vec![Called { name: drive.to_owned(), from_ms: i64::MIN, to_ms: i64::MAX, after, before: i64::MAX }];
+    while all.len() < NAMES
+        && let Some(now) = all.last_mut()
+    {
+        let found = told(connection, now, RENAMED, 1)?;
+        let was = |body: &str| serde_json::from_str::<Renamed>(body).ok();
+        let Some((renamed, Renamed { was })) = found.into_iter().next().and_then(|renamed| {
+            let was = was(renamed.body.as_ref()?.get())?;
+            Some((renamed, was))
+        }) else {
+            break;
+        };
+        let (at, number) = (renamed.time_unix_ms, renamed.number);
+        (now.from_ms, now.after) = (at, number);
+        all.push(Called { name: was, from_ms: i64::MIN, to_ms: at, after, before: number });
+    }
+    Ok(all)
+}
+
+/// When something was done last, by whichever name of its drive, of what is told behind a record.
+fn last_done(
+    connection: &Connection,
+    part: &str,
+    called: &[Called],
+    after: i64,
+) -> Result<Option<i64>, StoreError> {
+    let is_of_part = |body: &str| serde_json::from_str::<Done>(body).is_ok_and(|done| done.part == part);
+    for called in called {
+        let called = Called { after: called.after.max(after), ..called.clone() };
+        let done = told(connection, &called, DONE, 1_000)?;
+        let last = done.iter().find(|record| record.body.as_ref().is_some_and(|body| is_of_part(body.get())));
+        if let Some(last) = last {
+            return Ok(Some(last.time_unix_ms));
+        }
+    }
+    Ok(None)
+}
+
+/// Events of one word of a drive, while it was called so: the newest first.
+fn told(
+    connection: &Connection,
+    of: &Called,
+    what: &str,
+    limit: usize,
+) -> Result<Vec<RecordView>, StoreError> {
     let filter = Filter {
         to_ms: i64::MAX,
         from_ms: i64::MIN,
-        after,
-        drive: Some(&of.drive),
+        after: of.after,
+        drive: Some(&of.name),
         kind: Some(Kind::Event.name()),
-        what: Some(DONE),
-        limit: 1_000,
-        before: Some(i64::MAX),
+        what: Some(what),
+        limit,
+        before: Some(of.before),
         line: None,
         only_alarms: false,
     };
-    let done = records(connection, &filter)?.records;
-    let is_of_part = |body: &str| serde_json::from_str::<Done>(body).is_ok_and(|done| done.part == of.part);
-    let last = done.iter().find(|record| record.body.as_ref().is_some_and(|body| is_of_part(body.get())));
-    Ok(last.map(|last| last.time_unix_ms))
+    Ok(records(connection, &filter)?.records)
 }
 
 #[cfg(test)]
@@ -311,6 +387,62 @@ mod tests {
         assert_eq!(stands().0, AlarmState::Unacknowledged);
         tell(&test.plant, &[bearings(9)]);
         assert_eq!(stands().0, AlarmState::Returned);
+    }
+
+    #[test]
+    fn a_drive_that_is_called_otherwise_keeps_its_hours_and_starts_and_takes_none_of_another() {
+        let folder = Folder::new("history-maintenance-renamed");
+        let mut file = store::open(&folder.file("history.sqlite")).unwrap().store;
+        let moment = |at: i64| Moment { steady_ms: at, wall_ms: 1_795_219_200_000 + at };
+        let mut archive = Archive::begin(moment(0));
+        archive.begin_run(&mut file.connection, "test").unwrap();
+        let count = |drive: &str| {
+            let (drive, part) = (drive.to_owned(), "belt".to_owned());
+            Count::new(Maintained { drive, part, hours: None, starts: Some(6) })
+        };
+        let mut trackers = [Tracker::default(), Tracker::default()];
+        let (mut fan, mut other) = (count("fan"), count("pump"));
+        // For two hours a fan runs under the name of pump, while another one has its name; then each has another.
+        for minute in 0..240 {
+            let (at, is_renamed) = (minute * MINUTE_MS, minute >= 120);
+            let names = if is_renamed { ["fan", "mill"] } else { ["pump", "fan"] };
+            let runs = [minute % 60 >= 30, minute % 10 >= 5];
+            for ((name, runs), tracker) in names.into_iter().zip(runs).zip(&mut trackers) {
+                let state = if runs { 3 } else { 2 };
+                let seen = tracker.see(at, 2 * MINUTE_MS, &[(Quantity::STATE, state)]);
+                let shown = seen.map(|seen| Shown { drive: name.into(), set: Set::Status, seen });
+                archive.take(Batch { shown: shown.into_iter().collect(), ..Batch::default() }, moment(at));
+            }
+            if minute == 120 {
+                trackers = [Tracker::default(), Tracker::default()];
+                for (was, name) in [("fan", "mill"), ("pump", "fan")] {
+                    archive.record(Record {
+                        kind: Kind::Event,
+                        drive: Some(name.to_owned()),
+                        body: Some(serde_json::json!({ "was": was }).to_string()),
+                        ..Record::of_history(moment(at), RENAMED, "called otherwise")
+                    });
+                }
+                archive.write_records(&mut file.connection, moment(at)).unwrap();
+            }
+            if minute % 7 == 0 {
+                archive.close(moment(at));
+                archive.write_values(&mut file.connection).unwrap();
+                // The one that counts before it is told of the new name counts anew then.
+                fan.go_on(&file.connection).unwrap();
+            }
+        }
+        archive.end_run(&mut file.connection, moment(240 * MINUTE_MS)).unwrap();
+        fan.go_on(&file.connection).unwrap();
+        let mut anew = count("fan");
+        anew.go_on(&file.connection).unwrap();
+        assert_eq!((fan.starts, anew.starts), (4, 4));
+        assert!((anew.running_ms - 120 * MINUTE_MS).abs() <= 2 * MINUTE_MS, "{}", anew.running_ms);
+        let mut mill = count("mill");
+        mill.go_on(&file.connection).unwrap();
+        assert!((20..=24).contains(&mill.starts), "{}", mill.starts);
+        other.go_on(&file.connection).unwrap();
+        assert_eq!(other.starts, 2, "of a name that nobody has now it is what was told under it");
     }
 
     #[test]
