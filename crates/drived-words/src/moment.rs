@@ -33,8 +33,19 @@ pub fn said<Tz: TimeZone>(text: &str, now: &DateTime<Tz>) -> Result<Said<Tz>, No
     if text == "now" {
         return Ok(Said { at: now.clone(), again: None });
     }
-    let local = local(text, now.naive_local()).ok_or_else(|| NoMoment::Unread(text.to_owned()))?;
-    match in_order(now.timezone().from_local_datetime(&local)) {
+    let (mut local, is_time_alone) =
+        local(text, now.naive_local()).ok_or_else(|| NoMoment::Unread(text.to_owned()))?;
+    let mut times = in_order(now.timezone().from_local_datetime(&local));
+    if is_time_alone {
+        // In the hour that comes twice the clock shows less than it has shown.
+        let has_been = times.0.as_ref().map_or(local <= now.naive_local(), |at| at <= now);
+        if !has_been && let Some(yesterday) = local.checked_sub_days(Days::new(1)) {
+            local = yesterday;
+            times = in_order(now.timezone().from_local_datetime(&local));
+        }
+        times.1 = times.1.filter(|again| again <= now);
+    }
+    match times {
         (Some(at), again) => Ok(Said { at, again }),
         (None, _) => Err(NoMoment::LeftOut(local)),
     }
@@ -52,10 +63,11 @@ pub fn in_order<Tz: TimeZone>(
     }
 }
 
-fn local(text: &str, now: NaiveDateTime) -> Option<NaiveDateTime> {
+/// The time of the clock that is said, on the day that is said, and whether none is: that it is today then.
+fn local(text: &str, now: NaiveDateTime) -> Option<(NaiveDateTime, bool)> {
     let whole = ["%Y-%m-%d %H:%M", "%Y-%m-%d %H:%M:%S%.f", "%Y-%m-%dT%H:%M", "%Y-%m-%dT%H:%M:%S%.f"];
     if let Some(whole) = whole.into_iter().find_map(|form| NaiveDateTime::parse_from_str(text, form).ok()) {
-        return Some(whole);
+        return Some((whole, false));
     }
     let (day, time) = match text.split_once(char::is_whitespace) {
         Some((day @ ("today" | "yesterday"), time)) => (Some(day), time.trim_start()),
@@ -66,9 +78,8 @@ fn local(text: &str, now: NaiveDateTime) -> Option<NaiveDateTime> {
         ["%H:%M", "%H:%M:%S%.f"].into_iter().find_map(|form| NaiveTime::parse_from_str(time, form).ok())?;
     let today = now.date().and_time(time);
     match day {
-        Some("yesterday") => today.checked_sub_days(Days::new(1)),
-        None if today > now => today.checked_sub_days(Days::new(1)),
-        _ => Some(today),
+        Some("yesterday") => Some((today.checked_sub_days(Days::new(1))?, false)),
+        day => Some((today, day.is_none())),
     }
 }
 
@@ -144,6 +155,26 @@ mod tests {
         for text in ["soon", "tomorrow 03:12", "25:00", "2026-13-01 03:12", ""] {
             assert_eq!(read(text, now), Err(NoMoment::Unread(text.to_owned())));
         }
+    }
+
+    #[test]
+    fn in_the_hour_that_comes_twice_the_last_one_that_has_been_is_today_also_where_the_clock_shows_less() {
+        let now = |offset: i32, minute: u32| {
+            let local = hours(offset).from_local_datetime(&at(10, 25, 2, minute)).unwrap();
+            local.with_timezone(&Paris)
+        };
+        let told = |text: &str, now: &DateTime<Paris>| {
+            let said = said(text, now).unwrap();
+            (said.at.to_rfc3339(), said.again.map(|again| again.to_rfc3339()))
+        };
+        let [first, second, yesterday] =
+            ["2026-10-25T02:59:00+02:00", "2026-10-25T02:59:00+01:00", "2026-10-24T02:59:00+02:00"]
+                .map(str::to_owned);
+        // Two minutes ago; it is once more in 58 minutes.
+        assert_eq!(told("02:59", &now(1, 1)), (first.clone(), None));
+        assert_eq!(told("02:59", &now(1, 59)), (first.clone(), Some(second.clone())));
+        assert_eq!(told("02:59", &now(2, 58)), (yesterday, None));
+        assert_eq!(told("2026-10-25 02:59", &now(1, 1)), (first, Some(second)));
     }
 
     /// The zone of the machine tells the second of the two first, in Europe as in America.
