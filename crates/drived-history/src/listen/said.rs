@@ -1,6 +1,6 @@
 //! What a frame of the event stream says, as a record.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use drived_plant::plant::views::CommandView;
 use serde::Deserialize;
@@ -9,6 +9,9 @@ use crate::record::{Kind, Moment, Record};
 
 /// What is longer is kept without what the API told: a command for a thousand drives.
 const LONGEST_BODY: usize = 256 << 10;
+
+/// By so many words an alarm is kept at the most until its state or its count is another.
+const WORDS: usize = 16;
 
 /// An event as the stream tells it, as far as it is looked at here.
 #[derive(Deserialize)]
@@ -34,18 +37,23 @@ struct ToldAlarm {
     text: String,
 }
 
-/// The alarms as they were kept last, by their numbers: one that stands for others is told anew with each of them.
+/// The alarms as they were kept, by their numbers: state, count, and the words by which they were told since. One that stands for others is
+/// told anew with each of them, and a loss by turns with what came of each question.
 #[derive(Debug, Default)]
-pub(super) struct Alarms(BTreeMap<u64, (String, u32, String)>);
+pub(super) struct Alarms(BTreeMap<u64, (String, u32, BTreeSet<String>)>);
 
 impl Alarms {
     /// Whether it is another than it was.
     fn is_new(&mut self, ToldAlarm { id, count, state, text, .. }: &ToldAlarm) -> bool {
-        let now = (state.clone(), *count, text.clone());
-        match state == "over" {
-            true => self.0.remove(id).is_some(),
-            false => self.0.insert(*id, now.clone()).is_none_or(|before| before != now),
+        if state == "over" {
+            return self.0.remove(id).is_some();
         }
+        let (known, times, words) = self.0.entry(*id).or_default();
+        if (&*known, *times) != (state, *count) {
+            (*known, *times) = (state.clone(), *count);
+            words.clear();
+        }
+        words.len() < WORDS && words.insert(text.clone())
     }
 }
 
@@ -96,6 +104,9 @@ pub(super) fn said(frame: &str, now: Moment, alarms: &mut Alarms) -> Option<Reco
 
 /// What is worth keeping of a text: not when a line asks a silent drive next, which is another time in each.
 fn lasting(mut text: String) -> String {
+    if let Some(head) = text.strip_suffix(", it is probed as soon as the line is free") {
+        text.truncate(head.len());
+    }
     if let Some(at) = text.rfind(", next probe in ").filter(|at| !text[at + 1..].contains([',', ':'])) {
         text.truncate(at);
     }
@@ -177,6 +188,33 @@ mod tests {
         let text = "lost while it was running, the motor may turn: the slave is off-line";
         assert_eq!(told("539.8ms").as_deref(), Some(text));
         assert_eq!(told("1.2s"), None);
+    }
+
+    #[test]
+    fn a_loss_is_kept_once_by_each_of_its_words_however_often_these_come_again() {
+        let now = Moment { steady_ms: 0, wall_ms: 0 };
+        let mut alarms = Alarms::default();
+        let mut told = |state: &str, count: u32, why: &str| {
+            let text = format!("lost while it was running, the motor may turn: {why}");
+            let data =
+                serde_json::json!({ "id": 7, "count": count, "state": state, "drive": "pump", "text": text });
+            said(&format!("id: 1\nevent: alarm\ndata: {data}\n\n"), now, &mut alarms).is_some()
+        };
+        let whys = [
+            "no answer within 100 ms",
+            "expired before it was sent",
+            "the slave is off-line, next probe in 4.1 s",
+            "the slave is off-line, it is probed as soon as the line is free",
+        ];
+        let mut all = |state: &str, count: u32| {
+            let round = whys.iter().cycle().take(12);
+            round.filter(|why| told(state, count, why)).count()
+        };
+        assert_eq!(all("suppressed", 1), 3);
+        assert_eq!(all("unacknowledged", 1), 3, "it is another state");
+        assert_eq!(all("unacknowledged", 2), 3, "it has come again");
+        let endless = (0..1_000).filter(|number| told("unacknowledged", 2, &number.to_string())).count();
+        assert!(endless < WORDS, "{endless}");
     }
 
     #[test]
