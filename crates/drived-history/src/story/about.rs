@@ -151,6 +151,18 @@ pub(super) fn about(facts: &Facts, asked: Asked) -> Option<&RecordView> {
     then.or_else(near).or_else(unseen).or_else(soon).map(|(_, _, found)| found)
 }
 
+/// That nothing is recorded of the moment itself, where what is told came later than a clock and a poll explain. Where nobody saw it then, that
+/// is told by itself.
+pub(super) fn later(facts: &Facts, about: &RecordView, asked: Asked) -> Option<Sentence> {
+    let away = begins(about) - asked.to;
+    let is_later = away > SHOWN_MS && facts.gap_at(asked.from).is_none();
+    let text = format!(
+        "nothing is recorded of it at the moment that was asked for: this is the next, {} later",
+        lasting(away)
+    );
+    is_later.then(|| Sentence::of(Certainty::Seen, text).at(asked.from))
+}
+
 /// What else happened then, and is not told of why, in its order: each with what is told first of why.
 pub(super) fn also(facts: &Facts, about: &RecordView, asked: Asked, why: &[Sentence]) -> Vec<Sentence> {
     let (from, to) = match asked.from == asked.to {

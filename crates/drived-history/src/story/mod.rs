@@ -18,7 +18,7 @@ use drived_plant::plant::past::{RecordView, StoryView as Story};
 use rusqlite::Connection;
 
 use self::{
-    about::{Asked, about, also, beside},
+    about::{Asked, about, also, beside, later},
     before::before,
     body::body,
     course::{AFTER_MS, BEFORE_MS, course, not_known, settings, with_settings},
@@ -59,6 +59,8 @@ pub fn tell(connection: &Connection, drive: &str, at: i64) -> Result<Story, Stor
         None => moved.first().filter(|_| has_moved).cloned(),
     };
     why.extend(moved);
+    // First of all: it is not what was asked for.
+    why.splice(0..0, about.and_then(|about| later(&facts, about, asked)));
     let also = about.map(|about| also(&facts, about, asked, &why)).unwrap_or_default();
     why.extend(also);
     let beside = beside(&facts, about, moment, &why);

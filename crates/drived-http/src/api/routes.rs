@@ -329,7 +329,7 @@ fn pasts() -> Vec<Route> {
     let with_time = |route: Route| of_past(route.with_query(from).with_query(to));
     let parameter = |name, about, kind| Parameter { name, about, kind };
     let drives = parameter("drive", "of this drive, again for each; of all unless one is named", "string");
-    let at = parameter("at_unix_ms", "when, to the minute", "integer");
+    let at = parameter("at_unix_ms", "when, to the second; a whole minute is that minute", "integer");
     vec![
         of_past(
             Route::get("/api/v1/history/kept", past::about, "What the history keeps, and since when")

@@ -19,7 +19,7 @@ pub(crate) struct Args {
     /// The drive
     #[arg(value_name = "NAME")]
     name: String,
-    /// When, to the minute: 03:12, "yesterday 03:12", "2026-11-21 03:12"
+    /// When, to the minute or to the second: 03:12, 03:12:05, "yesterday 03:12", "2026-11-21 03:12"
     #[arg(value_name = "TIME")]
     at: String,
     #[command(flatten)]

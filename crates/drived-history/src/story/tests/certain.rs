@@ -203,6 +203,25 @@ fn a_drive_that_answered_by_exceptions_or_damaged_was_read_again_and_not_heard_a
     }
 }
 
+#[test]
+fn what_came_seconds_behind_the_moment_that_is_asked_for_is_told_with_how_much_later_it_came() {
+    let told = |at: i64| {
+        let mut night = Written::begin("certain-seconds-later");
+        night.status(|at| vec![(Quantity::STATE, if at < 309_000 { RUNNING } else { FAULT })]);
+        night.event(309_040, "tripped", "tripped: 17 OLF: motor overload", None);
+        night.told(at)
+    };
+    let later = "nothing is recorded of it at the moment that was asked for: this is the next, ";
+    let story = told(301_000);
+    assert!(story.about.as_ref().unwrap().text.contains("OLF"), "{story:?}");
+    assert!(story.why[0].text.starts_with(&format!("{later}8.0 s later")), "{story:?}");
+    // As exactly as a clock is read and a drive is polled it is then, and the minute is what it is asked as.
+    for at in [307_000, 300_000] {
+        let story = told(at);
+        assert!(story.why.iter().all(|why| !why.text.starts_with(later)), "{at}: {story:?}");
+    }
+}
+
 /// The load rose 3.3 s later, and the trip came 10 s behind that.
 #[test]
 fn a_moment_before_something_is_told_as_one_at_which_nothing_happened() {
