@@ -27,7 +27,7 @@ pub enum AlarmKind {
     RunLeft,
     /// The audit log cannot be written, so that only stops are carried out.
     AuditLog,
-    /// The history cannot be written: what happens now is not known later.
+    /// The history cannot be written: what happens now waits in memory, and what finds no room there is lost.
     History,
     /// A drive has run for so long, or was started so often, that something of it is to be seen to.
     Maintenance,
@@ -109,7 +109,7 @@ impl AlarmKind {
             ),
             Self::History => row(
                 "history",
-                "the history cannot be written, what happens now is not known later",
+                "the history cannot be written, what happens now waits in memory and may be lost",
                 Severity::Warning,
                 "see whether its disk is full; the log of the program says why",
             ),

@@ -96,7 +96,7 @@ const TABLE = {
   alarm_stop_left: ['a stop was not confirmed, and nobody gives it, for its drive is not in the configuration: the motor may turn', 'un arrêt n’a pas été confirmé et personne ne le donne, car son variateur n’est pas dans la configuration : le moteur peut tourner'],
   alarm_run_left: ['a run command of this program may stand in a drive that is not in the configuration, and nobody watches it: the motor may turn', 'un ordre de marche de ce programme peut être donné à un variateur qui n’est pas dans la configuration, et personne ne le surveille : le moteur peut tourner'],
   alarm_audit_log: ['the audit log cannot be written, only stops are carried out', 'le journal d’audit ne peut être écrit, seuls les arrêts sont exécutés'],
-  alarm_history: ['the history cannot be written, what happens now is not known later', 'l’historique ne peut être écrit, ce qui se passe maintenant ne sera pas connu plus tard'],
+  alarm_history: ['the history cannot be written, what happens now waits in memory and may be lost', 'l’historique ne peut être écrit, ce qui se passe maintenant attend en mémoire et peut être perdu'],
   alarm_maintenance: ['maintenance is due', 'un entretien est à faire'],
   alarm_reload: ['the configuration does not hold as it was read again', 'la configuration relue ne tient pas'],
   alarm_of_line: ['line {line}', 'ligne {line}'],
