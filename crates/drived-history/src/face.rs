@@ -14,9 +14,9 @@ use tokio::{
 };
 
 use crate::{
+    asked::Asked,
     clocks::Clocks,
     config::{HistoryConfig, HistoryEntry},
-    doubt::Asked,
     forward,
     listen::Listening,
     maintenance,

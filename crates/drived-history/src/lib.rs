@@ -12,6 +12,7 @@
     reason = "a crate of the program: what is public is so for its other crates, who read its sources, and most names say it all"
 )]
 
+mod asked;
 mod captured;
 mod chunk;
 mod clocks;

@@ -631,8 +631,8 @@ async fn what_only_readers_find_damaged_is_put_aside_and_a_new_one_begun() {
         let (clocks, done) = (crate::clocks::Clocks::begin(), std::sync::Arc::default());
         let (limits, waiting) = (Limits::default(), inbox.clone());
         let past = crate::past::InFile { path: path.clone(), limits, inbox: waiting, clocks, done };
-        let past = crate::doubt::Asked(past);
-        let ask = |past: &crate::doubt::Asked| {
+        let past = crate::asked::Asked(past);
+        let ask = |past: &crate::asked::Asked| {
             let all = RecordsAsked { to_unix_ms: i64::MAX, ..RecordsAsked::default() };
             past.parameters("pump").and_then(|_| past.records(&all))
         };
