@@ -20,7 +20,7 @@ use serde::Serialize;
 use tokio::{
     sync::watch,
     task::{AbortHandle, JoinSet},
-    time::{Instant, MissedTickBehavior, interval},
+    time::{Instant, MissedTickBehavior, interval, sleep},
 };
 
 use self::said::{Alarms, said};
@@ -49,6 +49,8 @@ const MINUTE: Duration = Duration::from_secs(60);
 const PULSE: Duration = Duration::from_millis(500);
 /// and what is no delay of a busy machine any more.
 const STOOD_STILL: Duration = Duration::from_secs(2);
+/// An alarm of the program is looked for once in a second.
+const SEEN_WITHIN: Duration = Duration::from_secs(3);
 /// So many of the last exchanges of its line are kept beside a trip.
 const EXCHANGES: usize = 40;
 
@@ -338,6 +340,10 @@ async fn tell(plant: Plant, mut health: watch::Receiver<Health>) {
         if let Some(text) = text {
             is_told = !is_told;
             plant.tell_notice(NoticeView::new("history", is_told, text));
+            if is_told {
+                // Whoever looks for alarms sees it, however soon it is over.
+                sleep(SEEN_WITHIN).await;
+            }
         }
         if health.changed().await.is_err() {
             return;
@@ -347,6 +353,7 @@ async fn tell(plant: Plant, mut health: watch::Receiver<Health>) {
 
 #[cfg(test)]
 mod tests {
+    use drive_fleet::alarms::{AlarmKind, AlarmState};
     use drived_config::rights::{Caller, Rights};
     use drived_plant::plant::testing::TestPlant;
 
@@ -367,6 +374,25 @@ mod tests {
         };
         assert_eq!(kept().await, ["pump 1", "pump 2"]);
         assert!(kept().await.is_empty(), "a history that was opened anew goes on where the one before ended");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_file_that_was_put_aside_is_an_alarm_also_where_the_next_is_written_at_once() {
+        let test = TestPlant::of(1).await;
+        let (health, seen) = watch::channel(Health::Writing);
+        let _listening = Listening::start(&test.plant, &Inbox::default(), Clocks::begin(), seen);
+        tokio::time::sleep(Duration::from_secs(1)).await;
+        for _ in 0..3 {
+            health.send_replace(Health::Failing("it is damaged and was put aside".to_owned()));
+            tokio::time::sleep(Duration::from_millis(50)).await;
+            health.send_replace(Health::Writing);
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+        tokio::time::sleep(Duration::from_secs(10)).await;
+        let alarms = test.plant.alarms().alarms;
+        let of_history = alarms.iter().find(|view| view.alarm.kind == AlarmKind::History);
+        let told = of_history.map(|view| (view.state, view.alarm.count));
+        assert_eq!(told, Some((AlarmState::Returned, 1)), "{alarms:?}");
     }
 
     #[test]
