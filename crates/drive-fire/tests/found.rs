@@ -133,6 +133,10 @@ fn no_story_that_was_a_find_is_one_again() {
             "the stop of a 58 on UNI-TELWAY that never ended: it was put aside while a port opened anew was listened to",
         ),
         (
+            "3.0.0.o5.l8.o8.l8.s0.o5.l4.o8.l2",
+            "a ramp stop that sped a 312 up: a preset speed was put on bit 12 of CMD while its motor stood",
+        ),
+        (
             "3.4.0.f7x1.o2.f60x2.o9",
             "a 312 over Modbus TCP whose answer had another one in its middle: the stage was wrong",
         ),
