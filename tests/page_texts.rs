@@ -1,6 +1,6 @@
 //! The page tells the faults of the manuals, and why a drive refuses, in French too.
 
-use std::time::Duration;
+use std::{path::Path, time::Duration};
 
 use drive_bus::evidence::{Alike, Certainty, Defect, Finding};
 use drive_core::{Control, FaultEntry, Refusal};
@@ -34,6 +34,18 @@ fn quoted(source: &str) -> impl Iterator<Item = &str> {
     lines.flat_map(|line| line.split('"').skip(1).step_by(2)).filter(|text| text.contains(' '))
 }
 
+/// Every source below a folder.
+fn sources(folder: &Path) -> Vec<String> {
+    let files = std::fs::read_dir(folder).expect("it is a folder");
+    files
+        .map(|file| file.expect("it is listed").path())
+        .flat_map(|path| match path.is_dir() {
+            true => sources(&path),
+            false => vec![std::fs::read_to_string(&path).expect("it is read")],
+        })
+        .collect()
+}
+
 #[test]
 fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/");
@@ -41,9 +53,7 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
     let french = read("drived-http/src/page/web/sentences_fr.js").replace("\\'", "'");
     let mut sentences: Vec<String> = Vec::new();
     for family in ["atv21", "atv28", "atv58", "atv312", "3g3ev"] {
-        let folder = std::fs::read_dir(format!("{root}drive-{family}/src")).expect("it is a folder");
-        for file in folder.map(|file| file.expect("it is listed").path()) {
-            let Ok(source) = std::fs::read_to_string(&file) else { continue };
+        for source in sources(format!("{root}drive-{family}/src").as_ref()) {
             for before in ["by: \"", "remedy: \"", "Refusal::Settings("] {
                 let texts = source.split(before).skip(1).filter_map(|rest| {
                     let rest = rest.trim_start().trim_start_matches('"');
@@ -53,10 +63,8 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
             }
         }
     }
-    let of_profiles = std::fs::read_dir(format!("{root}drive-profile/src/drive")).expect("it is a folder");
-    for file in of_profiles.map(|file| file.expect("it is listed").path()) {
+    for source in sources(format!("{root}drive-profile/src/drive").as_ref()) {
         // What stands over two lines is one sentence.
-        let source = std::fs::read_to_string(&file).expect("it is read");
         let source = source.replace("\\\n     ", "");
         for before in ["by: \"", "remedy: \"", "Refusal::Settings(", "Refusal::OnlyAStartShows("] {
             sentences.extend(source.split(before).skip(1).filter_map(|rest| {

@@ -232,6 +232,7 @@ export const SENTENCES_FR = {
   'open the input, or set PS2 to PS16 to nO': 'ouvrir l’entrée, ou régler PS2 à PS16 sur nO',
   'a function is assigned to bit 11 of CMD, so it does not reverse: free that bit': 'une fonction est affectée au bit 11 de CMD, qui n’inverse donc pas : libérer ce bit',
   'AdC injects current into a motor at rest without a run command (p. 41): disable operation first, by a freewheel stop': 'AdC injecte du courant dans un moteur à l’arrêt sans ordre de marche (p. 41) : verrouiller d’abord, par un arrêt roue libre',
+  'LAC goes back to L2 or L1 only by a return to factory settings (p. 35): do that at the drive': 'LAC ne revient à L2 ou L1 que par un retour aux réglages usine (p. 35) : le faire au variateur',
   'the access level is none that the manual lists: set LAC to L1, L2 or L3': 'le niveau d’accès n’est pas de ceux du manuel : régler LAC sur L1, L2 ou L3',
   'the drive checks no consistency and is locked on standstill (CMI bit 15): clear that bit': 'le variateur ne contrôle pas la cohérence et est verrouillé à l’arrêt (CMI bit 15) : remettre ce bit à 0',
   'the drive is locked on standstill (CMI bit 13): clear that bit': 'le variateur est verrouillé à l’arrêt (CMI bit 13) : remettre ce bit à 0',
