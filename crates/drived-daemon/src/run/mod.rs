@@ -157,6 +157,8 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     opened.tell(&config.lines);
     let by_profile = opened.clone().follow(plant.clone(), doors.audit(), fleet.events());
     let by_profile = tokio::spawn(by_profile);
+    // Before the faces take readers of theirs, which are told what there is besides.
+    let for_the_audit = fleet.events();
     let known = names.clone();
     let faces = Faces::open(faces, Surroundings::new(plant.clone(), doors.audit(), names.clone()));
     let silences = {
@@ -185,7 +187,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let sources: Vec<Arc<dyn Source>> = vec![Arc::new(reloader.clone()), Arc::new(faces.clone())];
     let doors = doors.open(metrics::serve(router, plant.clone(), sources), api::stops());
     plant.follow_audit(doors.audit().failing());
-    let audited = doors.follow(known, fleet.events());
+    let audited = doors.follow(known, for_the_audit);
     let watching = notify.watch(fleet.clone(), doors.listening());
     let screen = with_table.then(|| table(plant.clone())).flatten();
     // Below the table: what was said before it is behind it.
