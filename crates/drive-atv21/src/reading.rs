@@ -92,6 +92,12 @@ impl<P: Port> Atv21<P> {
             None => self.read_each(class, &FAST_SET).await?,
         };
         words.extend(self.read_each(class, &[map::COMMAND_SOURCE]).await?);
+        if self.watch.shaft.was_braked() && self.registers.is_torn() {
+            // FD00 may be of behind a trip that FD01 was too early for: no ramp has brought the motor down then.
+            let again = self.read_each(class, &[map::STATUS_WORD]).await?;
+            words.retain(|word| word.address != map::STATUS_WORD.address());
+            words.extend(again);
+        }
         let mut status = Status { at: self.registers.snapshot_time(), ..status::status(words) };
         self.tell(&mut status);
         if status.is_fault() || status.state == State::NotReady {

@@ -205,6 +205,12 @@ impl<P: Port> Registers<P> {
         self.oldest
     }
 
+    /// Whether the picture has taken so long that its parts may be of different moments.
+    #[must_use]
+    pub fn is_torn(&self) -> bool {
+        self.oldest.is_some_and(|oldest| oldest.elapsed() > CONFIRMED_WITHIN / 2)
+    }
+
     /// What was read is a part of the picture.
     fn see(&mut self, at: Instant) {
         self.oldest = Some(self.oldest.map_or(at, |oldest| oldest.min(at)));

@@ -137,6 +137,10 @@ fn no_story_that_was_a_find_is_one_again() {
             "a ramp stop that sped a 312 up: a preset speed was put on bit 12 of CMD while its motor stood",
         ),
         (
+            "0.4.0.s0.o6.l6.o8.f71x1.l4",
+            "a 21 that tripped in the middle of a status behind a stop told at rest at 0.7 Hz, by a word of before and one of behind",
+        ),
+        (
             "3.4.0.f7x1.o2.f60x2.o9",
             "a 312 over Modbus TCP whose answer had another one in its middle: the stage was wrong",
         ),
