@@ -61,6 +61,10 @@ impl<P: Port> ProfileDrive<P> {
     pub(super) async fn read_status(&mut self, class: Class) -> Result<(Status, Words)> {
         let sight = self.sight.clone();
         let mut words = self.read_blocks(class, &sight.fast).await?;
+        if self.watch.shaft.was_braked() && self.registers.is_torn() {
+            // Its state may be of before a trip, and its output of behind it: no ramp has brought the motor down then.
+            words = self.read_blocks(class, &sight.fast).await?;
+        }
         if !sight.command.is_empty() && self.wants_command(class) {
             for block in &sight.command {
                 let read = self.read_block(class, *block).await.inspect_err(|_| self.watch.turns.again())?;
