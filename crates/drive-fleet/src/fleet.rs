@@ -148,7 +148,7 @@ impl Fleet {
     }
 
     /// What happens to the drives, from now on; the first reader gets it from the start of the fleet, and as many as
-    /// [were asked for](FleetBuilder::readers_from_the_start).
+    /// [were asked for](crate::FleetBuilder::readers_from_the_start).
     #[must_use]
     pub fn events(&self) -> Events {
         let first = self.inner.first.lock().unwrap_or_else(PoisonError::into_inner).pop();
