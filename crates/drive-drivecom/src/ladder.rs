@@ -323,7 +323,8 @@ pub async fn stop<D: Drivecom>(drive: &mut D, mode: StopMode) -> Result<Stopped>
                 }
             };
         let elsewhere = status.control.is_some_and(|control| control != Control::Bus);
-        if !corrected && (elsewhere || !shown) {
+        // One that the drive has not taken is written again before anything is read for it.
+        if !corrected && (elsewhere || !shown && written.is_ok()) {
             corrected = true;
             if let Some(other) = drive.corrected_stop(mode, stop).await {
                 stop = other;

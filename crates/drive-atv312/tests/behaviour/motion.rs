@@ -4,7 +4,7 @@ use drive_core::{
     Control, Direction, Drive, Error, ErrorKind, Frequency, Motion, Refusal, Setpoint, SetpointProblem,
     Speed, State, StopMode,
 };
-use drive_sim::Panel;
+use drive_sim::{Exception, Panel};
 use drive_testing::bench::{self, writes};
 
 use crate::support::{FIFTY, commands, factory, refusal, rig, row, running};
@@ -361,6 +361,18 @@ async fn a_stop_that_does_not_show_is_corrected_by_the_settings_as_they_are_now(
     assert!(machine.poke(11204, 0));
     drive.stop(StopMode::Fast).await.unwrap();
     assert_eq!(commands(&machine)[3..], [0x400F, 0x0002]);
+}
+
+/// Exception 04h: nothing was done. What the word depends on is read for one that the drive has taken and does not show.
+#[tokio::test(start_paused = true)]
+async fn a_stop_that_the_drive_has_refused_is_written_again_before_its_settings_are_read() {
+    let (mut drive, machine, _line) = running().await;
+    let before = machine.all_requests();
+    machine.refuse_next(Exception::FAILURE);
+    drive.stop(StopMode::Ramp).await.unwrap();
+    assert_eq!(commands(&machine)[3..], [0x100F; 2]);
+    // The stop, a status, the stop again, and a status that shows it.
+    assert_eq!(machine.all_requests() - before, 4);
 }
 
 /// PS2 = Cd12 (BBV51701 p. 42): bit 12 selects a preset speed then, by which 100Fh speeds the motor up in place of stopping it. The drive
