@@ -98,6 +98,7 @@ impl<P: Port> Atv28<P> {
         if evidence.reference == Told::Yes {
             evidence.reference = self.told_reference(words);
         }
+        evidence.reference = self.proof.watch.told_by_turning(evidence.reference);
         if let (Told::No(Refusal::Tripped), Some(code)) = (evidence.output, words.word(LFT)) {
             evidence.output = Told::No(Refusal::Fault(code));
         }
@@ -109,6 +110,8 @@ impl<P: Port> Atv28<P> {
         let state: StatusWords = words.state_words();
         let (braked, reacted) = (self.proof.watch.shaft.was_braked(), self.proof.has_reacted(state.chart()));
         let shown = state.output(self.command(), words.output(), true, braked, reacted);
-        self.proof.see(self.registers.snapshot_time(), shown, words.output());
+        let at = self.registers.snapshot_time();
+        self.proof.see(at, shown, words.output());
+        self.proof.see_turning(at, state.turning(), words.output());
     }
 }

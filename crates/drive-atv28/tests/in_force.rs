@@ -3,7 +3,7 @@
 use drive_atv28::{Atv28, CAPABILITIES};
 use drive_core::{
     Class, Control, Direction, Drive, Error, ErrorKind, Frequency, Lack, Lease, Refusal, Setpoint, State,
-    StopMode,
+    StopMode, Verdict,
 };
 use drive_testing::words::{Asked, Words, lacks_within};
 
@@ -168,4 +168,18 @@ async fn a_reference_from_elsewhere_that_never_stands_still_is_told_as_another_o
     drive.adopt(Lease::new(Direction::Forward, 0x000F));
     let told = lacks_within(&mut drive, 20).await;
     assert_eq!(told.map(|(lack, _)| lack), Some(Lack::Reference));
+}
+
+/// Reverse (ETA bit 15) behind a forward run command, in current limit (ETI bit 11): neither at its reference nor on a ramp.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_turns_the_other_way_and_says_nothing_of_a_ramp_is_not_told_in_force() {
+    let mut drive = drive(&[&STANDS, &RUNS, &[(458, 0x8227), (459, 0x4812)]]);
+    drive.adopt(Lease::new(Direction::Forward, 0x000F));
+    let mut told = Vec::new();
+    for _ in 0..6 {
+        told.push(drive.status().await.unwrap().verdict);
+        tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+    }
+    assert!(!told.contains(&Some(Verdict::InForce)), "{told:?}");
+    assert!(matches!(told[5], Some(Verdict::NotInForce { lacks: Lack::Reference, .. })), "{told:?}");
 }

@@ -185,6 +185,7 @@ impl<P: Port> Atv312<P> {
         if evidence.reference == Told::Yes {
             evidence.reference = self.told_reference(words);
         }
+        evidence.reference = self.proof.watch.told_by_turning(evidence.reference);
         let by_input = self.facts.inputs.and_then(|inputs| settings.stopped_by(inputs));
         match (evidence.output, by_input) {
             (Told::No(Refusal::Tripped), _) | (_, None) => {}
@@ -214,6 +215,7 @@ impl<P: Port> Atv312<P> {
             self.proof.see(at, Output::None, Some(Frequency::ZERO));
         }
         self.proof.see(at, shown, frequency);
+        self.proof.see_turning(at, state.turning(), frequency);
     }
 
     /// Whether direct current can only be that of `AdC`: no bit and no input asks for another.

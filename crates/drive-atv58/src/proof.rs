@@ -3,7 +3,6 @@
 
 use drive_core::{Class, Direction, Evidence, Frequency, Output, Port, Refusal, Result, State, Status, Told};
 use drive_drivecom::{ChartState, ControlWord, follows_frequency};
-use tokio::time::Instant;
 
 use crate::{Atv58, command::OTHER_REFERENCE, registers::CMD};
 
@@ -178,7 +177,7 @@ impl<P: Port> Atv58<P> {
             _ => Output::Cut,
         };
         self.turning = status.direction.filter(|_| turns);
-        self.proof.watch.see_turning(Instant::now(), self.turning, at);
+        self.proof.see_turning(None, (self.turning, None), output);
         self.proof.see(status.at, shown, output);
     }
 }

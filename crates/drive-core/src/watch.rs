@@ -36,8 +36,17 @@ pub struct Watch {
     armed: bool,
     /// By what the last look showed a run to have ended: a trip, or direct current.
     ended_by: Option<Output>,
-    /// The lowest output at which the motor was seen to turn against the run command, and when.
-    against: Option<(Frequency, Instant)>,
+    against: Option<Against>,
+}
+
+/// A motor that turns against the run command.
+#[derive(Debug, Clone, Copy)]
+struct Against {
+    /// The lowest output at which it was seen to, and when.
+    lowest: Frequency,
+    at: Instant,
+    /// The drive says itself that it is not on its way down.
+    stays: bool,
 }
 
 impl Watch {
@@ -87,14 +96,25 @@ impl Watch {
         self.run.lease().is_some_and(|lease| direction.is_some_and(|seen| seen != lease.direction))
     }
 
-    /// Which way a status shows the motor to turn, at which output; `None`: it stands, or that is not told.
-    pub fn see_turning(&mut self, at: Instant, direction: Option<Direction>, output: Frequency) {
-        let lowest = self.against.filter(|(lowest, _)| *lowest <= output);
-        self.against = self.is_against(direction).then(|| lowest.unwrap_or((output, at)));
+    /// Which way a status shows the motor to turn, at which output; `None`: it stands, or that is not told. And whether the drive says
+    /// itself that the motor comes down, or does not, where it says so.
+    pub fn see_turning(
+        &mut self,
+        at: Instant,
+        direction: Option<Direction>,
+        output: Frequency,
+        comes_down: Option<bool>,
+    ) {
+        let before = self.against.filter(|before| before.lowest <= output && comes_down != Some(true));
+        let stays = comes_down == Some(false);
+        let now =
+            || before.map_or(Against { lowest: output, at, stays }, |before| Against { stays, ..before });
+        self.against = self.is_against(direction).then(now);
     }
 
     /// What is told of the reference by the way in which the motor was [seen](Self::see_turning) to turn, where its words tell `reference`:
-    /// behind a change of direction it comes down along its ramp; whoever does not is turned by another's sign.
+    /// behind a change of direction it comes down along its ramp; whoever does not is turned by another's sign. **No family judges that
+    /// itself.**
     #[must_use]
     pub fn told_by_turning(&self, reference: Told) -> Told {
         const AGAINST: Refusal = Refusal::Overridden {
@@ -102,7 +122,9 @@ impl Watch {
             remedy: "see which one it is, and start again",
         };
         match (reference, self.against) {
-            (Told::Yes | Told::NotTold, Some((_, since))) if since.elapsed() > TURNS_ROUND => {
+            (Told::Yes | Told::NotTold, Some(Against { at, stays, .. }))
+                if stays || at.elapsed() > TURNS_ROUND =>
+            {
                 Told::No(AGAINST)
             }
             (Told::Yes, Some(_)) => Told::NotTold,
@@ -286,24 +308,31 @@ mod tests {
         let mut watch = Watch::default();
         watch.run.give(Lease::new(Direction::Forward, 1));
         let mut told = vec![];
-        for (at, direction, output) in [
-            (0, Some(Direction::Forward), 30),
+        for (at, direction, output, comes_down) in [
+            (0, Some(Direction::Forward), 30, None),
             // It was told to turn round, and comes down; then it does not any more.
-            (1, Some(Direction::Reverse), 30),
-            (5, Some(Direction::Reverse), 20),
-            (6, Some(Direction::Reverse), 20),
-            (9, Some(Direction::Reverse), 20),
-            (10, None, 0),
+            (1, Some(Direction::Reverse), 30, None),
+            (5, Some(Direction::Reverse), 20, None),
+            (6, Some(Direction::Reverse), 20, None),
+            (9, Some(Direction::Reverse), 20, None),
+            (10, None, 0, None),
+            // A drive that says so is believed at once, and one that says that it slows down is, however slowly that goes.
+            (11, Some(Direction::Reverse), 20, Some(false)),
+            (12, Some(Direction::Reverse), 20, Some(true)),
+            (16, Some(Direction::Reverse), 20, Some(true)),
+            (18, Some(Direction::Reverse), 20, None),
+            (20, Some(Direction::Reverse), 20, None),
         ] {
             tokio::time::sleep_until(begun + Duration::from_secs(at)).await;
-            watch.see_turning(Instant::now(), direction, hertz(output));
+            watch.see_turning(Instant::now(), direction, hertz(output), comes_down);
             told.push(match watch.told_by_turning(Told::Yes) {
                 Told::Yes => "yes",
                 Told::NotTold => "not told",
                 Told::No(_) => "no",
             });
         }
-        assert_eq!(told, ["yes", "not told", "not told", "not told", "no", "yes"]);
+        let first = ["yes", "not told", "not told", "not told", "no", "yes"];
+        assert_eq!(told, [&first[..], &["no", "not told", "not told", "not told", "no"]].concat());
     }
 
     /// A panel's STOP brings a motor down whose drive runs until it stands.

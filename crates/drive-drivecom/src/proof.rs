@@ -9,7 +9,7 @@ use super::{
     chart::ChartState,
     limits::{follows_frequency, follows_speed},
 };
-use drive_core::{Frequency, Ground, Lease, Motion, Output, RunWord, Watch};
+use drive_core::{Direction, Frequency, Ground, Lease, Motion, Output, RunWord, Watch};
 
 /// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the keypad may
 /// change them.
@@ -280,12 +280,22 @@ impl<L: Copy + PartialEq> Proof<L> {
     pub fn see(&mut self, at: Option<Instant>, shown: Output, frequency: Option<Frequency>) {
         self.motion = self.watch.see(at.unwrap_or_else(Instant::now), shown, frequency);
     }
+
+    /// Which way a status shows the motor to be driven, and whether it says that the motor comes down.
+    pub fn see_turning(
+        &mut self,
+        at: Option<Instant>,
+        (direction, comes_down): (Option<Direction>, Option<bool>),
+        frequency: Option<Frequency>,
+    ) {
+        let output = frequency.unwrap_or_default();
+        self.watch.see_turning(at.unwrap_or_else(Instant::now), direction, output, comes_down);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drive_core::Direction;
 
     const RUN: Lease = Lease::new(Direction::Forward, 0x000F);
 

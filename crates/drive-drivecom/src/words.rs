@@ -397,8 +397,7 @@ impl StatusWords {
         };
         let control = self.control();
         let command = (control != Control::Bus).then_some(Refusal::NotInControl(control));
-        let turned =
-            frh != Frequency::ZERO && self.asks_for() != lease.direction || self.turns_against(lease);
+        let turned = frh != Frequency::ZERO && self.asks_for() != lease.direction;
         Evidence {
             word: RunWord::NotTold,
             command: Told::unless(command),
@@ -407,16 +406,18 @@ impl StatusWords {
         }
     }
 
-    /// Whether the motor turns against a run command and is not on its way to obey it: it speeds up, or is where its reference is. Who
-    /// is turned round slows down first.
-    fn turns_against(self, lease: Lease) -> bool {
-        let settled = self.eta.contains(StatusWord::REFERENCE_REACHED)
+    /// Which way these words show the motor to be driven, and whether they say that it comes down: as
+    /// [`Watch::see_turning`](drive_core::Watch::see_turning) wants it.
+    #[must_use]
+    pub fn turning(self) -> (Option<Direction>, Option<bool>) {
+        let is_driven = self.chart() == Some(ChartState::OperationEnabled) && self.is_turning();
+        let goes_on = self.eta.contains(StatusWord::REFERENCE_REACHED)
             || self.eti.contains(ExtendedStatus::ACCELERATING);
-        self.chart() == Some(ChartState::OperationEnabled)
-            && self.is_turning()
-            && self.eta.direction() != lease.direction
-            && settled
-            && !self.eti.contains(ExtendedStatus::DECELERATING)
+        let comes_down = match self.eti.contains(ExtendedStatus::DECELERATING) {
+            true => Some(true),
+            false => goes_on.then_some(false),
+        };
+        (is_driven.then(|| self.eta.direction()), comes_down)
     }
 
     /// Whether the motor is driven or may be. A reference of zero asks for nothing.
@@ -568,24 +569,19 @@ mod tests {
 
     use super::*;
 
-    /// A reference that another master has written with a sign: an Altivar 312 that was started forward turns in reverse (ETA bit 15), at
-    /// its reference (bit 10) or on the way there (ETI bit 9), whatever ETI bit 15 says of what is asked for.
+    /// ETA bits 10 and 15, ETI bits 9 and 10 (p. 21, 22).
     #[test]
-    fn a_motor_that_turns_against_its_run_command_and_does_not_slow_down_follows_another_reference() {
-        let thirty = Frequency::from_hertz(30);
-        for (eta, eti, follows) in [
-            (0x0627, 0x4012, true),
-            (0x8627, 0x4012, false),
-            (0x8227, 0x4212, false),
-            // It is turned round.
-            (0x8227, 0x4412, true),
+    fn which_way_a_motor_turns_and_whether_it_comes_down_is_told_as_the_drive_says_it() {
+        use Direction::{Forward, Reverse};
+        for (eta, eti, told) in [
+            (0x0627, 0x4012, (Some(Forward), Some(false))),
+            (0x8627, 0x4012, (Some(Reverse), Some(false))),
+            (0x8227, 0x4212, (Some(Reverse), Some(false))),
+            (0x8227, 0x4412, (Some(Reverse), Some(true))),
+            (0x8227, 0x4812, (Some(Reverse), None)),
+            (0x8223, 0x4412, (None, Some(true))),
         ] {
-            let evidence = StatusWords::new(eta, eti).evidence(
-                Lease::new(Direction::Forward, 0x000F),
-                thirty,
-                Some(thirty),
-            );
-            assert_eq!(evidence.reference == Told::Yes, follows, "{eta:04X}h {eti:04X}h");
+            assert_eq!(StatusWords::new(eta, eti).turning(), told, "{eta:04X}h {eti:04X}h");
         }
     }
 

@@ -84,7 +84,8 @@ impl<P: Port> ProfileDrive<P> {
         let at = status.at.unwrap_or_else(Instant::now);
         status.motion = self.watch.see(at, shown, status.output_frequency);
         let turns = status.output_frequency.filter(|output| *output != Frequency::ZERO);
-        self.watch.see_turning(at, status.direction.filter(|_| turns.is_some()), turns.unwrap_or_default());
+        let direction = status.direction.filter(|_| turns.is_some());
+        self.watch.see_turning(at, direction, turns.unwrap_or_default(), None);
         let evidence = self.evidence(&status, &words);
         status.verdict = self.watch.run.verdict(&evidence);
         Ok((status, words))
