@@ -133,6 +133,10 @@ table! {
     /// A stop is on its way and not confirmed yet.
     StopPending: "stop_pending", "a stop is on its way, not confirmed yet", Note, false,
         "wait until it is confirmed";
+    /// Its motor runs by a command of this side, and nobody here knows at which setpoint: behind a lost line or a restart of the program, of a
+    /// drive that tells no reference. Whether it follows is not judged.
+    SetpointUnknown: "setpoint_unknown", "at which setpoint the motor runs is not known here", Note, false,
+        "give it a setpoint: whether its output comes to that is watched from then on";
     /// Its output was cut while the motor turned, and nothing tells when the shaft has come to rest.
     Coasting: "coasting", "output off, the shaft may coast", Note, false,
         "keep away from the shaft until it is seen to stand";

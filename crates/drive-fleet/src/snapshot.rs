@@ -204,20 +204,22 @@ pub struct PendingStop {
 /// An output that is not at its setpoint, and comes no nearer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OffSetpoint {
-    /// As this fleet gave it, and the drive confirmed it.
+    /// As this fleet gave it, and the drive confirmed it; else what the drive tells as the reference that it follows.
     pub setpoint: Frequency,
+    /// Whether this fleet gave it: behind a lost line, or a restart of the program, it knows of none.
+    pub is_given: bool,
     /// As the drive tells it.
     pub output: Frequency,
 }
 
 impl OffSetpoint {
     /// By a status: further than what the compensation of slip makes of it.
-    pub(crate) fn of(setpoint: Option<Setpoint>, status: &Status) -> Option<Self> {
+    pub(crate) fn of(setpoint: Option<Setpoint>, is_given: bool, status: &Status) -> Option<Self> {
         let (Some(Setpoint::Frequency(setpoint)), Some(output)) = (setpoint, status.output_frequency) else {
             return None;
         };
         let is_off = output.centihertz().abs_diff(setpoint.centihertz()) > NEAR_WITH_SLIP.centihertz();
-        is_off.then_some(Self { setpoint, output })
+        is_off.then_some(Self { setpoint, is_given, output })
     }
 }
 
@@ -393,6 +395,12 @@ impl Snapshot {
             Some(age) if self.link == Link::Connected && age <= max_age => Freshness::Fresh,
             Some(_) => Freshness::Stale,
         }
+    }
+
+    /// Whether the drive tells the reference that its motor follows, with its status or with its measurements.
+    pub(crate) fn tells_reference(&self) -> bool {
+        self.status.as_ref().is_some_and(|status| status.value.reference.is_some())
+            || self.measurements.as_ref().is_some_and(|measured| measured.value.reference.is_some())
     }
 
     /// Whether the output has reached the setpoint; `None` where none is known, or no status that is fresh at `now`.

@@ -104,8 +104,9 @@ impl Snapshot {
                 (None, (!limits.is_empty()).then(|| Some(limits.join(", ")))?)
             }
             ConcernKind::OffSetpoint => {
-                let OffSetpoint { setpoint, output } = self.off_setpoint?;
-                (None, Some(format!("output {output}, setpoint {setpoint}")))
+                let OffSetpoint { setpoint, is_given, output } = self.off_setpoint?;
+                let whose = if is_given { "setpoint" } else { "the drive's own reference" };
+                (None, Some(format!("output {output}, {whose} {setpoint}")))
             }
             ConcernKind::Warning => {
                 (None, status.filter(|status| status.value.warning == Some(true)).map(|_| None)?)
@@ -116,6 +117,10 @@ impl Snapshot {
                 let lasts = Tenths(now.saturating_duration_since(stop.since));
                 let how = if stop.taken { "the drive is stopping" } else { "it is repeated" };
                 (Some(stop.since), Some(format!("{} stop for {lasts}, {how}", stop.mode)))
+            }
+            ConcernKind::SetpointUnknown => {
+                let is_unknown = self.setpoint.is_none() && !self.tells_reference();
+                (None, (is_unknown && self.started_here() && shaft(Motion::Driven)).then_some(None)?)
             }
             ConcernKind::Coasting => (None, shaft(Motion::Coasting).then_some(None)?),
             ConcernKind::Held => (None, shaft(Motion::Held).then_some(None)?),
@@ -163,7 +168,9 @@ impl Snapshot {
                 // They are never asked for where they have no period.
                 Freshness::Never => self.measurements_max_age <= self.max_age,
             },
-            ConcernKind::OffSetpoint => self.setpoint.is_some() || status.is_undriven(),
+            ConcernKind::OffSetpoint => {
+                self.setpoint.is_some() || self.tells_reference() || status.is_undriven()
+            }
             ConcernKind::Warning => status.warning.is_some(),
             _ => true,
         }

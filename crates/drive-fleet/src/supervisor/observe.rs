@@ -328,6 +328,7 @@ impl Supervisor {
         let result = self.judge_reference(now, result);
         let Ok(measurements) = result else { return };
         self.retraction.measurements(now);
+        self.off_setpoint.measure(&measurements, self.status.as_ref());
         self.measurements = Some(Timed::<Measurements>::new(measurements, now));
         self.check_limits();
         if self.status.as_ref().is_some_and(|status| status.value.is_fault()) {
@@ -382,7 +383,7 @@ impl Supervisor {
     fn judge_setpoint(&mut self, now: Instant) {
         let Some(status) = &self.status else { return self.off_setpoint.forget() };
         let given = self.given.filter(|given| given.at < status.at).map(|given| given.setpoint);
-        self.off_setpoint.see(now, given, &status.value);
+        self.off_setpoint.see(now, given, self.lease.is_some(), &status.value);
     }
 
     /// There is no valid status any more.

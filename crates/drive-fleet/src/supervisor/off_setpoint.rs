@@ -3,10 +3,10 @@
 
 use std::time::Duration;
 
-use drive_core::{CONFIRMED_WITHIN, Frequency, Motion, Setpoint, Status};
+use drive_core::{CONFIRMED_WITHIN, Frequency, Measurements, Motion, Setpoint, Status};
 use tokio::time::Instant;
 
-use crate::snapshot::OffSetpoint;
+use crate::snapshot::{OffSetpoint, Timed};
 
 /// How long an output has to stay where it is. With [`STEADY`] the slowest ramp that is not taken for none takes 4000 s from 50 Hz.
 const STAYS_FOR: Duration = Duration::from_secs(20);
@@ -25,13 +25,19 @@ pub(super) struct Watch {
     /// The lowest and the highest output since it is above its setpoint and does not come down, and since when it rises.
     above: Option<(Frequency, Frequency, Option<Instant>)>,
     off: Option<OffSetpoint>,
+    /// The reference that the drive was measured to follow, and the output then.
+    measured: Option<(Frequency, Frequency)>,
 }
 
 impl Watch {
-    /// By the next status, and by the setpoint that the drive has confirmed before it.
-    pub(super) fn see(&mut self, now: Instant, setpoint: Option<Setpoint>, status: &Status) {
-        let off = OffSetpoint::of(setpoint, status).filter(|_| status.motion == Motion::Driven);
-        let Some(off) = off else { return self.forget() };
+    /// By the next status, and by the setpoint that the drive has confirmed before it. Where nobody knows what was `given`, as behind a
+    /// lost line and a restart of the program, the drive's own reference is what a motor has to come to that runs by a command of this side
+    /// (`ours`).
+    pub(super) fn see(&mut self, now: Instant, given: Option<Setpoint>, ours: bool, status: &Status) {
+        let is_given = given.is_some();
+        let own = || self.own_reference(status).filter(|_| ours).map(Setpoint::Frequency);
+        let off = OffSetpoint::of(given.or_else(own), is_given, status);
+        let Some(off) = off.filter(|_| status.motion == Motion::Driven) else { return self.come_to() };
         let says_so = status.at_reference == Some(true);
         self.said_since = says_so.then(|| self.said_since.unwrap_or(now));
         let (low, high, since) = self.stays.unwrap_or((off.output, off.output, now));
@@ -56,6 +62,33 @@ impl Watch {
             || lasts(rises_since, CONFIRMED_WITHIN)
             || lasts(Some(stays.2), STAYS_FOR);
         self.off = is_off.then_some(off);
+    }
+
+    /// The reference that the drive tells with its status; else as it was measured, for as long as the motor has not left the output of
+    /// then: another may have been given since.
+    fn own_reference(&self, status: &Status) -> Option<Frequency> {
+        let stays = |output: Frequency, then: Frequency| {
+            output.centihertz().abs_diff(then.centihertz()) <= STEADY.centihertz()
+        };
+        let measured = || {
+            let (reference, then) = self.measured?;
+            status.output_frequency.is_some_and(|output| stays(output, then)).then_some(reference)
+        };
+        status.reference.or_else(measured)
+    }
+
+    /// What the drive was measured to follow, at the output that its status before has told.
+    pub(super) fn measure(&mut self, measurements: &Measurements, status: Option<&Timed<Status>>) {
+        let output = status.and_then(|status| status.value.output_frequency);
+        self.measured = match measurements.reference {
+            Some(Setpoint::Frequency(reference)) => output.map(|output| (reference, output)),
+            _ => None,
+        };
+    }
+
+    /// It is there, or is not asked to be.
+    fn come_to(&mut self) {
+        *self = Self { measured: self.measured, ..Self::default() };
     }
 
     /// What was seen tells nothing any more.

@@ -220,6 +220,7 @@ fn a_start_that_takes_the_command_is_not_told_as_control_that_comes_back() {
     rig.drive.status.control = Some(Control::Local);
     rig.pass(2_000 * MS);
     rig.outputs.clear();
+    rig.drive.status.reference = Some(Frequency::from_hertz(25));
     rig.order(START);
     rig.drive.status.control = Some(Control::Bus);
     rig.pass(1_000 * MS);

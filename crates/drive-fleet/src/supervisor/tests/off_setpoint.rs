@@ -1,6 +1,11 @@
 //! Outputs that are not at their setpoints.
 
 use super::*;
+use crate::alarms::{AlarmKind, Look, Moment};
+
+fn moment(rig: &Rig) -> Moment {
+    Moment { at: rig.now, unix_ms: 0 }
+}
 
 /// What is told of an output that is not at its setpoint.
 fn off(rig: &Rig) -> Option<String> {
@@ -75,4 +80,58 @@ fn a_drive_that_is_at_its_reference_and_not_at_its_setpoint_is_told_once_that_la
         rig.pass(2_000 * MS);
         assert_eq!(off(&rig).as_deref(), told, "{hertz} Hz, {at_reference}");
     }
+}
+
+/// Behind a lost line nobody knows what was given since: the drive's own reference is what it has to come to.
+#[test]
+fn behind_a_lost_line_an_output_is_held_against_the_drives_own_reference() {
+    for measured in [false, true] {
+        let mut rig = Rig::running_at(25);
+        rig.drive.status.at_reference = Some(true);
+        rig.pass(2_000 * MS);
+        rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+        rig.pass(60_000 * MS);
+        assert_eq!(rig.snapshot().link, Link::Lost);
+        rig.drive.failing = None;
+        let fifty = Frequency::from_hertz(50);
+        match measured {
+            true => rig.drive.reference = Some(fifty.into()),
+            false => rig.drive.status.reference = Some(fifty),
+        }
+        rig.pass(60_000 * MS);
+        assert_eq!((rig.snapshot().link, rig.snapshot().setpoint), (Link::Connected, None));
+        assert_eq!(off(&rig).as_deref(), Some("output 25.00 Hz, the drive's own reference 50.00 Hz"));
+        // Somebody else gives it another, to which it goes.
+        rig.drive.status.output_frequency = Some(fifty);
+        rig.pass(500 * MS);
+        assert_eq!(off(&rig), None);
+        rig.drive.status.output_frequency = Some(Frequency::from_hertz(20));
+        rig.drive.status.reference = rig.drive.status.reference.map(|_| Frequency::from_hertz(20));
+        rig.pass(2_500 * MS);
+        assert_eq!(off(&rig), None, "what was measured before is none of its output of now");
+    }
+}
+
+#[test]
+fn a_motor_of_ours_whose_setpoint_nobody_knows_and_that_tells_no_reference_is_told_as_that() {
+    let told = |rig: &Rig| {
+        let concerns = rig.snapshot().concerns(rig.now);
+        concerns.iter().any(|concern| concern.kind == ConcernKind::SetpointUnknown)
+    };
+    let mut rig = Rig::running_at(25);
+    assert!(!told(&rig));
+    rig.drive.reference = None;
+    rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
+    rig.pass(60_000 * MS);
+    rig.drive.failing = None;
+    rig.pass(60_000 * MS);
+    assert!(told(&rig));
+    assert!(
+        !Look::at_drive("north", &rig.snapshot(), moment(&rig))
+            .seen
+            .contains(&AlarmKind::Drive(ConcernKind::OffSetpoint))
+    );
+    rig.order(setpoint(25));
+    rig.pass(1_000 * MS);
+    assert!(!told(&rig), "it was given one");
 }
