@@ -397,6 +397,15 @@ impl Snapshot {
         }
     }
 
+    /// The codes of the faults that stand in a drive that has tripped, as far as it has told them.
+    pub(crate) fn present_faults(&self) -> Vec<u16> {
+        let said = self.present_trip().and_then(|trip| trip.faults.as_deref());
+        let said: Vec<u16> =
+            said.into_iter().flat_map(|said| &said.present).map(|fault| fault.code).collect();
+        let shown = || self.status.as_ref().and_then(|status| status.value.fault_code);
+        if said.is_empty() { shown().into_iter().collect() } else { said }
+    }
+
     /// Whether the drive tells the reference that its motor follows, with its status or with its measurements.
     pub(crate) fn tells_reference(&self) -> bool {
         self.status.as_ref().is_some_and(|status| status.value.reference.is_some())

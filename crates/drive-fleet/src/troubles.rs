@@ -1,6 +1,6 @@
 //! What troubles a drive now, read off its snapshot: by the table of [`ConcernKind`] and nowhere else.
 
-use drive_core::{Control, Error, Motion};
+use drive_core::{Control, Error, Fault, Motion};
 use tokio::time::Instant;
 
 use crate::{
@@ -44,12 +44,17 @@ impl Snapshot {
             ConcernKind::Tripped => {
                 let shown = status.filter(|status| status.value.is_fault())?;
                 let trip = self.present_trip();
-                let fault = trip.and_then(Trip::fault);
                 let unread = || shown.value.fault_code.map(|code| format!("fault {code}"));
-                let told = fault.map(|fault| match fault.entry {
+                let told = |fault: &Fault| match fault.entry {
                     Some(_) => fault.to_string(),
                     None => format!("fault {}", fault.code),
-                });
+                };
+                let said =
+                    trip.and_then(|trip| trip.faults.as_deref()).filter(|said| !said.present.is_empty());
+                let told = match said {
+                    Some(said) => Some(said.present.iter().map(told).collect::<Vec<_>>().join(", ")),
+                    None => trip.and_then(Trip::fault).as_ref().map(told),
+                };
                 (trip.map(|trip| trip.at), told.or_else(unread))
             }
             ConcernKind::RunSuspended => {

@@ -97,6 +97,9 @@ pub struct Alarm {
     /// What is known of it besides, such as the fault.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub detail: Option<String>,
+    /// The codes of the faults that it is of, as far as they are known: one that was not among them is another alarm.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub faults: Vec<u16>,
     /// What to do first.
     pub remedy: String,
     /// Since when it was so at its first coming, in milliseconds since 1970.

@@ -81,6 +81,7 @@ impl Alarms {
                 line: look.line.clone(),
                 mark: mark.clone(),
                 detail,
+                faults: condition.faults.clone(),
                 remedy,
                 first_unix_ms: since,
                 last_unix_ms: since,
@@ -102,8 +103,18 @@ impl Alarms {
         let is_new = !alarm.is_active();
         let is_explained = alarm.detail != detail || alarm.remedy != remedy;
         (alarm.detail, alarm.remedy) = (detail, remedy);
-        if is_new {
-            again(alarm, since);
+        // Somebody has taken note of the fault that was there, or put that aside, and of no other.
+        let before = !alarm.faults.is_empty();
+        let is_another = before && condition.faults.iter().any(|code| !alarm.faults.contains(code));
+        if !condition.faults.is_empty() {
+            alarm.faults.clone_from(&condition.faults);
+        }
+        if is_new || is_another {
+            if is_another {
+                alarm.shelved = None;
+            }
+            // Its trip may be older than the fault that stands in it now.
+            again(alarm, if is_new { since } else { now });
             changes.push(told(Became::CameAgain, alarm));
         } else if is_explained {
             changes.push(told(Became::Explained, alarm));

@@ -7,6 +7,7 @@ use tokio::time::Instant;
 
 use super::table::AlarmKind;
 use crate::{
+    concern::ConcernKind,
     place::Place,
     settings::RunRecord,
     snapshot::{Link, Snapshot},
@@ -46,6 +47,8 @@ pub struct Condition {
     pub detail: Option<String>,
     /// What to do first, where that is not what its kind says.
     pub remedy: Option<String>,
+    /// The codes of the faults that it is of; none: they are not known.
+    pub faults: Vec<u16>,
 }
 
 /// What is seen of something.
@@ -85,6 +88,10 @@ impl Look {
                 since_unix_ms: found.since.map(|since| now.of(since)),
                 detail: found.detail,
                 remedy: None,
+                faults: match concern {
+                    ConcernKind::Tripped => snapshot.present_faults(),
+                    _ => Vec::new(),
+                },
             })
         };
         let seen = |kind: &AlarmKind| match kind {
@@ -167,7 +174,7 @@ impl Look {
 }
 
 fn condition(kind: AlarmKind, mark: Option<String>, detail: Option<String>) -> Condition {
-    Condition { kind, mark, since_unix_ms: None, detail, remedy: None }
+    Condition { kind, mark, since_unix_ms: None, detail, remedy: None, faults: Vec::new() }
 }
 
 fn alarms_of_drives() -> impl Iterator<Item = AlarmKind> {

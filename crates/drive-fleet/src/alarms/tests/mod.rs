@@ -23,6 +23,7 @@ fn look(drive: Option<&str>, line: Option<&str>, there: &[AlarmKind]) -> Look {
         since_unix_ms: None,
         detail: None,
         remedy: None,
+        faults: Vec::new(),
     };
     Look {
         drive: drive.map(str::to_owned),
@@ -104,6 +105,37 @@ fn what_comes_again_before_its_end_is_the_same_alarm_and_is_acknowledged_anew() 
     alarms.look(&[pump(&[TRIPPED])], 60);
     let another = &alarms.all()[0];
     assert!(another.id > id && another.count == 1, "its life was over");
+}
+
+/// ISA-18.2 and IEC 62682: what was acknowledged, or shelved, is the alarm that was there.
+#[test]
+fn another_fault_in_the_place_of_one_that_was_acknowledged_or_shelved_is_acknowledged_anew() {
+    let tripped_by = |faults: &[u16]| {
+        let mut look = pump(&[TRIPPED]);
+        look.there[0].faults = faults.to_vec();
+        look
+    };
+    let mut alarms = Alarms::default();
+    // It is not read yet by which.
+    alarms.look(&[tripped_by(&[])], 10);
+    let id = alarms.all()[0].id;
+    alarms.acknowledge(id, "Anna", None, 20).unwrap();
+    for (at, faults) in [(30, &[5][..]), (40, &[5]), (50, &[])] {
+        let changes = alarms.look(&[tripped_by(faults)], at);
+        assert_eq!(became(&changes), [], "{faults:?} is known, no other one");
+    }
+    // In its place, and on top of it.
+    for (at, faults) in [(60, &[9][..]), (70, &[9, 5])] {
+        assert_eq!(became(&alarms.look(&[tripped_by(faults)], at)), [Became::CameAgain], "{faults:?}");
+        assert_eq!(states(&alarms), [(TRIPPED, AlarmState::Unacknowledged)]);
+        assert_eq!(alarms.all()[0].last_unix_ms, at);
+        alarms.acknowledge(id, "Anna", None, at).unwrap();
+    }
+    assert_eq!(became(&alarms.look(&[tripped_by(&[9])], 80)), [], "one of them is gone");
+    alarms.shelve(id, "Anna", "is being repaired", Duration::from_secs(60), 90).unwrap();
+    assert_eq!(became(&alarms.look(&[tripped_by(&[11])], 100)), [Became::CameAgain]);
+    assert_eq!(states(&alarms), [(TRIPPED, AlarmState::Unacknowledged)]);
+    assert_eq!((alarms.all()[0].id, alarms.all()[0].count), (id, 4));
 }
 
 #[test]

@@ -111,6 +111,23 @@ fn a_program_that_was_started_anew_ends_nothing_before_the_drive_has_shown_it() 
 }
 
 #[test]
+fn of_a_drive_that_names_another_fault_than_was_acknowledged_somebody_is_told() {
+    let now = Instant::now();
+    let by = |code| {
+        let mut drive = showing(State::Fault, Motion::AtRest, now);
+        let status = drive.status.as_mut().unwrap();
+        status.value = Arc::new(Status { fault_code: Some(code), ..Status::clone(&status.value) });
+        Look::at_drive("north", &drive, moment(now))
+    };
+    let mut alarms = Alarms::default();
+    alarms.look(&[by(5)], 10);
+    alarms.acknowledge(alarms.all()[0].id, "Anna", None, 20).unwrap();
+    assert_eq!(became(&alarms.look(&[by(5)], 30)), []);
+    assert_eq!(became(&alarms.look(&[by(9)], 40)), [Became::CameAgain]);
+    assert_eq!(alarms.all()[0].detail.as_deref(), Some("fault 9"));
+}
+
+#[test]
 fn a_trip_of_a_drive_that_is_lost_stands_until_it_is_seen_without_it() {
     let now = Instant::now();
     let mut alarms = Alarms::default();
