@@ -52,7 +52,8 @@ impl<P: Port> Atv21<P> {
         block: Option<([WriteSlot; 2], u16)>,
     ) -> Result<Status> {
         let (held, word) = self.judge_start(direction).await?;
-        if Self::takes(held, word) {
+        let takes = Self::takes(held, word);
+        if takes {
             self.take_command(Command::Start(direction), held, word).await?;
         }
         // The lease is there before the word is on its way: a call that is dropped here leaves somebody who withdraws
@@ -78,7 +79,8 @@ impl<P: Port> Atv21<P> {
             Err(error) if both.is_some() && error.kind() == ErrorKind::OutcomeUnknown => {}
             Err(error) if error.kind() == ErrorKind::NotSent => {
                 self.watch.run.was_not_written();
-                return Err(error);
+                // Command was taken before.
+                return Err(if takes { error.after_write() } else { error });
             }
             Err(error) => return Err(error),
         }
@@ -153,8 +155,8 @@ impl<P: Port> Atv21<P> {
         self.write_command_word(word - CommandWord::RUN - CommandWord::REVERSE).await?;
         let mut settling = Confirming::within(SETTLED_WITHIN);
         let reason = loop {
-            let status = self.read_briefly().await?;
-            match self.decides_instead(&status, word).await? {
+            let status = self.read_briefly().await.map_err(Error::after_write)?;
+            match self.decides_instead(&status, word).await.map_err(Error::after_write)? {
                 None => return Ok(()),
                 Some(reason) if !settling.again().await => break reason,
                 Some(_) => {}
@@ -162,7 +164,7 @@ impl<P: Port> Atv21<P> {
         };
         // What acts once has acted: written again it would trip or reset the drive once more.
         let before = CommandWord::from_bits_truncate(held.bits()) - CommandWord::EDGES;
-        self.write_command_word(before).await?;
+        self.write_command_word(before).await.map_err(Error::after_write)?;
         Err(self.refused(command, reason))
     }
 

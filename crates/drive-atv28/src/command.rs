@@ -150,11 +150,11 @@ impl<P: Port> Drivecom for Atv28<P> {
         status.raw.push(raw_command(held));
         let direction = ControlWord::from_bits_retain(word).direction();
         let shown = words.state_words().shows_run(direction, words.reference(), words.output());
-        if held != word || in_force.is_none() || shown == RunShown::NotYet {
+        let Some(in_force) = in_force.filter(|_| held == word && shown != RunShown::NotYet) else {
             return Ok(RunShown::NotYet);
-        }
+        };
         // The setpoint that the run command found is the one that it is to follow from now on.
-        self.proof.given = in_force;
+        self.proof.is_to_follow(in_force);
         status.verdict = Some(Verdict::InForce);
         Ok(shown)
     }

@@ -31,9 +31,10 @@ impl<P: Port> Atv28<P> {
         };
         let word =
             if self.is_negative().await? { word.cast_signed().wrapping_neg().cast_unsigned() } else { word };
-        self.registers.at(Class::Command).replacing(LFR.address()).write(register, word).await?;
+        self.proof.is_giving(register.address(), word);
+        let written = self.registers.at(Class::Command).replacing(LFR.address()).write(register, word).await;
         let is_lfr = register.address() == LFR.address();
-        self.proof.gives(register.address(), word, is_lfr);
+        self.proof.gave(register.address(), word, is_lfr, written)?;
         let frequency = is_lfr.then(|| count(word));
         self.registers.owe_judgement();
         self.see_setpoint(setpoint, frequency).await.map_err(Error::after_write)
@@ -87,7 +88,7 @@ impl<P: Port> Atv28<P> {
 
     /// Whether the drive holds the word that it was given last: its acknowledgement alone does not tell.
     async fn holds_setpoint(&mut self) -> Result<bool> {
-        let Some((register, word)) = self.proof.given else { return Ok(false) };
+        let Some((register, word)) = self.proof.given() else { return Ok(false) };
         let held = self.registers.at(Class::Command).read_words(register, 1).await?;
         Ok(held.first() == Some(&word))
     }

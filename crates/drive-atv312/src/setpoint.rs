@@ -44,9 +44,10 @@ impl<P: Port> Atv312<P> {
         let word = if self.is_negative(&words, &controls).await? { negative(word) } else { word };
         // Both are images of the one reference of the bus, so a later setpoint of either kind takes the place of one
         // that still waits.
-        self.registers.at(Class::Command).replacing(LFR.address()).write(register, word).await?;
+        self.proof.is_giving(register.address(), word);
+        let written = self.registers.at(Class::Command).replacing(LFR.address()).write(register, word).await;
         let is_lfr = register.address() == LFR.address();
-        self.proof.gives(register.address(), word, is_lfr);
+        self.proof.gave(register.address(), word, is_lfr, written)?;
         let frequency = is_lfr.then(|| resolution.frequency(word));
         self.registers.owe_judgement();
         self.see_setpoint(setpoint, frequency).await.map_err(Error::after_write)
@@ -86,7 +87,7 @@ impl<P: Port> Atv312<P> {
 
     /// Whether the drive holds the word that it was given last: its acknowledgement alone does not tell.
     async fn holds_setpoint(&mut self) -> Result<bool> {
-        let Some((register, word)) = self.proof.given else { return Ok(false) };
+        let Some((register, word)) = self.proof.given() else { return Ok(false) };
         let held = self.registers.at(Class::Command).read_words(register, 1).await?;
         Ok(held.first() == Some(&word))
     }

@@ -156,7 +156,7 @@ impl<P: Port> Drivecom for Atv58<P> {
         };
         if shown != RunShown::NotYet {
             // The setpoint that the run command found is the one that it is to follow from now on.
-            self.proof.given = Some((W401.address(), reference));
+            self.proof.is_to_follow((W401.address(), reference));
             status.verdict = Some(Verdict::InForce);
         }
         Ok(shown)

@@ -4,7 +4,11 @@
 use drive_core::{Class, Direction, Evidence, Frequency, Output, Port, Refusal, Result, State, Status, Told};
 use drive_drivecom::{ChartState, ControlWord, follows_frequency};
 
-use crate::{Atv58, command::OTHER_REFERENCE, registers::CMD};
+use crate::{
+    Atv58,
+    command::OTHER_REFERENCE,
+    registers::{CMD, W401},
+};
 
 /// What has its turn: `CMD` with `W401`, and the limits.
 const TURNS: [Look; 2] = [Look::Control, Look::Limits];
@@ -144,7 +148,8 @@ impl<P: Port> Atv58<P> {
             let is_judged = self.map.speed_limits.is_none() || self.proof.has_looked(&Look::Limits);
             return if is_judged { Told::No(OTHER_REFERENCE) } else { Told::NotTold };
         }
-        Told::unless(self.proof.given.is_some_and(|(_, given)| given != w401).then_some(WRITTEN_BY_ANOTHER))
+        let ours = self.proof.may_be_ours((W401.address(), w401));
+        Told::unless((!ours).then_some(WRITTEN_BY_ANOTHER))
     }
 
     /// What the shaft does, as far as the mapped words show it.

@@ -31,9 +31,11 @@ impl<P: Port> Atv58<P> {
             let problem = SetpointProblem::OutsideFrequencyLimits { low, high };
             return Err(Error::Setpoint { slave, setpoint, problem });
         }
+        let word = count.cast_unsigned();
+        self.proof.is_giving(W401.address(), word);
         let mut calls = self.registers.at(Class::Command).replacing(W401.address());
-        calls.write(W401, count.cast_unsigned()).await?;
-        self.proof.gives(W401.address(), count.cast_unsigned(), true);
+        let written = calls.write(W401, word).await;
+        self.proof.gave(W401.address(), word, true, written)?;
         self.registers.owe_judgement();
         self.see_setpoint(setpoint).await.map_err(Error::after_write)
     }
@@ -76,7 +78,7 @@ impl<P: Port> Atv58<P> {
     /// Whether the drive holds the word that it was given last: its acknowledgement alone does not tell.
     async fn holds_setpoint(&mut self) -> Result<bool> {
         let held = self.registers.at(Class::Command).read(W401).await?;
-        Ok(Some((W401.address(), held)) == self.proof.given)
+        Ok(Some((W401.address(), held)) == self.proof.given())
     }
 
     /// Whether the drive follows the reference of the bus, as far as the map names the word that tells.

@@ -432,6 +432,22 @@ impl Error {
         }
     }
 
+    /// Whether nothing was written before it: it was refused here, was not sent, or is of a reading that was to come before the first write.
+    /// An exchange that fails behind a write says so by [`after_write`](Self::after_write).
+    #[must_use]
+    pub const fn has_written_nothing(&self) -> bool {
+        match self.kind() {
+            ErrorKind::Refused | ErrorKind::Unsupported | ErrorKind::NotSent => true,
+            ErrorKind::OutcomeUnknown | ErrorKind::NotConfirmed => false,
+            ErrorKind::NoAnswer | ErrorKind::Exception | ErrorKind::Answer => match self {
+                Self::Port { exchange, .. }
+                | Self::Exception { exchange, .. }
+                | Self::Answer { exchange, .. } => !exchange.is_write(),
+                _ => false,
+            },
+        }
+    }
+
     /// Whether it says of a setpoint that nothing speaks against it, and that only a start shows it: a start may follow.
     #[must_use]
     pub const fn only_a_start_shows(&self) -> bool {

@@ -9,11 +9,14 @@ use super::{
     chart::ChartState,
     limits::{follows_frequency, follows_speed},
 };
-use drive_core::{Direction, Frequency, Ground, Lease, Motion, Output, RunWord, Watch};
+use drive_core::{Direction, ErrorKind, Frequency, Ground, Lease, Motion, Output, Result, RunWord, Watch};
 
 /// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the keypad may
 /// change them.
 const LIMITS_HOLD: Duration = Duration::from_secs(10);
+
+/// How many setpoints are kept of which nobody has seen whether they arrived. Each is written behind a reading, which settles those before.
+const MAY_STAND: usize = 8;
 
 /// A low and a high limit.
 pub type Limits = (Frequency, Frequency);
@@ -43,7 +46,9 @@ pub struct Proof<L> {
     /// What the shaft did at the last status.
     pub motion: Motion,
     /// The register and the word of the setpoint that is to be in force.
-    pub given: Option<(u16, u16)>,
+    given: Option<(u16, u16)>,
+    /// Those that were written since and may stand instead, or come late: their answer was lost, or nobody waited for it.
+    may_stand: Vec<(u16, u16)>,
     /// The first reference of the bus, `LFr`, as it was read or written last.
     pub reference: Option<u16>,
     /// `LFRD` and `FRHD`, once they were looked for behind the present words.
@@ -66,6 +71,7 @@ impl<L> Default for Proof<L> {
             watch: Watch::default(),
             motion: Motion::NotKnown,
             given: None,
+            may_stand: Vec::new(),
             reference: None,
             speeds: None,
             held: None,
@@ -85,6 +91,7 @@ impl<L: Copy + PartialEq> Proof<L> {
         (self.held, self.reference, self.limits, self.question) = (None, None, None, None);
         if self.watch.run.lease().is_none() {
             self.given = None;
+            self.may_stand.clear();
         }
     }
 
@@ -136,12 +143,50 @@ impl<L: Copy + PartialEq> Proof<L> {
         }
     }
 
-    /// A setpoint was written.
-    pub const fn gives(&mut self, register: u16, word: u16, is_first: bool) {
-        self.given = Some((register, word));
-        if is_first {
-            self.reference = Some(word);
+    /// A setpoint is about to be written: a call that is dropped from here on leaves it in the drive, or the one before.
+    pub fn is_giving(&mut self, register: u16, word: u16) {
+        if self.may_stand.len() == MAY_STAND {
+            self.may_stand.remove(0);
         }
+        self.may_stand.push((register, word));
+    }
+
+    /// What became of the write of a setpoint: it is the one that is to be in force, or never arrived, or may stand.
+    ///
+    /// # Errors
+    /// Those of the write.
+    pub fn gave(&mut self, register: u16, word: u16, is_first: bool, written: Result<()>) -> Result<()> {
+        match &written {
+            Ok(()) => {
+                self.is_to_follow((register, word));
+                if is_first {
+                    self.reference = Some(word);
+                }
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::Exception | ErrorKind::NotSent) => {
+                self.may_stand.pop();
+            }
+            Err(_) => {}
+        }
+        written
+    }
+
+    /// The setpoint that is to be in force from now on, written or found: its register and its word.
+    pub fn is_to_follow(&mut self, setpoint: (u16, u16)) {
+        self.given = Some(setpoint);
+        self.may_stand.clear();
+    }
+
+    /// The setpoint that is to be in force, its register and its word.
+    #[must_use]
+    pub const fn given(&self) -> Option<(u16, u16)> {
+        self.given
+    }
+
+    /// Whether this side has given this setpoint, as far as nothing speaks against that.
+    #[must_use]
+    pub fn may_be_ours(&self, setpoint: (u16, u16)) -> bool {
+        self.given.is_none_or(|given| given == setpoint) || self.may_stand.contains(&setpoint)
     }
 
     /// Whose reference the motor follows, by `FrH`, with what a `count` of `LFr` is and the registers of `LFr` and `LFRD`.
@@ -159,12 +204,8 @@ impl<L: Copy + PartialEq> Proof<L> {
         };
         let by_first = self.reference.filter(follows);
         let by_second = self.speeds.filter(|&(lfrd, frhd)| follows_speed(frhd, lfrd)).map(|(lfrd, _)| lfrd);
-        let ours = match self.given {
-            None => by_first.or(by_second).is_some(),
-            Some((at, word)) => {
-                (at == first && by_first == Some(word)) || (at == second && by_second == Some(word))
-            }
-        };
+        let followed = [by_first.map(|word| (first, word)), by_second.map(|word| (second, word))];
+        let ours = followed.into_iter().flatten().any(|setpoint| self.may_be_ours(setpoint));
         match by_first.or(by_second) {
             Some(_) if ours => Followed::Ours,
             _ if self.speeds.is_none() => Followed::NotTold,
@@ -328,9 +369,9 @@ mod tests {
         for (lease, kept) in [(Some(RUN), Some((401, 200))), (None, None)] {
             let mut proof = Proof::<u8>::default();
             lease.into_iter().for_each(|lease| proof.adopt(lease));
-            proof.gives(401, 200, true);
+            proof.gave(401, 200, true, Ok(())).unwrap();
             proof.forget();
-            assert_eq!((proof.given, proof.reference), (kept, None));
+            assert_eq!((proof.given(), proof.reference), (kept, None));
         }
     }
 

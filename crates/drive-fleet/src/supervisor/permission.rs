@@ -5,7 +5,7 @@ use tokio::time::Instant;
 
 use super::{Asker, Job, Supervisor, orders::Active};
 use crate::{
-    limits::LimitProblem,
+    limits::{Given, LimitProblem},
     outcome::{Order, Refused, Until},
     snapshot::{Link, WatchdogCheck},
 };
@@ -233,8 +233,8 @@ impl Supervisor {
     }
 
     fn allow_setpoint(&self, now: Instant, setpoint: Setpoint) -> Result<(), Refused> {
-        let moving = self.status.as_ref().is_some_and(|status| !status.value.is_undriven());
-        let last = self.given.filter(|_| moving);
+        let moving = self.status.as_ref().filter(|status| !status.value.is_undriven());
+        let last = moving.and_then(|status| self.given.or_else(|| Given::shown(status)));
         let allowed = self.settings.limits.allow(now, setpoint, last);
         crate::mutant!("limit-passed", allowed, Ok(())).map_err(Refused::Limit)
     }

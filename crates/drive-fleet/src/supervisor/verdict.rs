@@ -31,9 +31,9 @@ impl Supervisor {
         match result {
             Ok(()) => self.setpoint_given(now, setpoint),
             Err(error) => {
-                // Where nothing was sent, or nothing was done, the drive holds what it held.
-                use ErrorKind::{Exception, NotSent, Refused, Unsupported};
-                self.given.take_if(|_| !matches!(error.kind(), Refused | Unsupported | NotSent | Exception));
+                // Where nothing was written, or nothing was done, the drive holds what it held.
+                let holds = error.has_written_nothing() || error.kind() == ErrorKind::Exception;
+                self.given.take_if(|_| !holds);
                 let is_start =
                     self.active.as_ref().is_some_and(|active| matches!(active.order, Order::Start { .. }));
                 match error.kind() {
@@ -53,6 +53,7 @@ impl Supervisor {
                             self.accept_status(now, status);
                         }
                     }
+                    _ if error.has_written_nothing() => self.end_order(unwritten(error)),
                     _ => self.verify(now, Job::SetSetpoint(setpoint, start), error),
                 }
             }
@@ -137,6 +138,7 @@ impl Supervisor {
                     self.accept_status(now, status);
                 }
             }
+            Err(error) if error.has_written_nothing() => self.end_unsent(now, unwritten(error)),
             // A save is an edge and cannot be read back.
             Err(error) if job == Job::Persist => {
                 let outcome = denied(&error).unwrap_or_else(|| self.unknown(now, Some(error)));
@@ -196,7 +198,13 @@ impl Supervisor {
     /// What the family says of a start whose answer was lost, so long after it.
     fn judge_lost_start(&mut self, now: Instant, status: &Status, after: Duration, denied: Option<Outcome>) {
         let Some(active) = &self.active else { return };
-        match crate::mutant!("lost-start-believed", status.verdict, Some(Verdict::InForce)) {
+        // Of one that was never written the run command of before is none.
+        let is_its = match active.order {
+            Order::Start { direction, .. } => self.lease.is_some_and(|lease| lease.direction == direction),
+            _ => true,
+        };
+        let verdict = status.verdict.filter(|verdict| is_its || *verdict != Verdict::InForce);
+        match crate::mutant!("lost-start-believed", verdict, Some(Verdict::InForce)) {
             Some(Verdict::InForce) => {
                 let done = active.order.done(Some(status));
                 match active.order {
@@ -304,19 +312,16 @@ fn shows(job: Job, status: &Status) -> bool {
     }
 }
 
-/// How an order ends at once that the drive denies, by why its answer was missing.
-fn denied(error: &Error) -> Option<Outcome> {
+/// How an order ends of which nothing was written.
+fn unwritten(error: Error) -> Outcome {
     match error {
-        Error::Port { problem: PortError::Expired, .. } => Some(Outcome::Expired),
-        error
-            if crate::mutant!(
-                "lost-answer-told-as-refused",
-                matches!(error.kind(), ErrorKind::NotSent | ErrorKind::Exception),
-                true
-            ) =>
-        {
-            Some(Outcome::Refused(Refused::Drive(error.clone())))
-        }
-        _ => None,
+        Error::Port { problem: PortError::Expired, .. } => Outcome::Expired,
+        error => Outcome::Refused(Refused::Drive(error)),
     }
+}
+
+/// How an order ends at once that the drive has answered that it does not carry out.
+fn denied(error: &Error) -> Option<Outcome> {
+    crate::mutant!("lost-answer-told-as-refused", error.kind() == ErrorKind::Exception, true)
+        .then(|| Outcome::Refused(Refused::Drive(error.clone())))
 }

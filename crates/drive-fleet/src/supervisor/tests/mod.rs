@@ -94,6 +94,8 @@ struct Paper {
     /// The content of every register.
     register: u16,
     log: Vec<Job>,
+    /// What an order reads before it writes is not answered.
+    reads_in_vain: bool,
 }
 
 fn slave() -> SlaveAddress {
@@ -102,6 +104,15 @@ fn slave() -> SlaveAddress {
 
 fn port_error(problem: PortError) -> Error {
     Error::Port { slave: slave(), exchange: Exchange { function: 3, register: Some(3201) }, problem }
+}
+
+/// The same of the write of an order: nobody knows what became of it, where it was sent.
+fn of_a_write(error: Error) -> Error {
+    let exchange = Exchange { function: 6, register: Some(8501) };
+    match error {
+        Error::Port { slave, problem, .. } => Error::Port { slave, exchange, problem },
+        error => error,
+    }
 }
 
 /// A write that the drive refuses by exception 04.
@@ -150,6 +161,7 @@ impl Paper {
             says: None,
             register: 0,
             log: Vec::new(),
+            reads_in_vain: false,
         }
     }
 
@@ -226,6 +238,13 @@ impl Paper {
 
     fn answer(&mut self, job: Job) -> Reply {
         self.log.push(job);
+        if self.reads_in_vain && matches!(job, Job::Start(_) | Job::SetSetpoint(..) | Job::ResetFaults) {
+            let error = port_error(PortError::Timeout { after: 100 * MS });
+            return match job {
+                Job::SetSetpoint(..) => Reply::Setpoint(Err(error)),
+                _ => Reply::Ordered(Err(error)),
+            };
+        }
         let reached = self.failing.is_none();
         match job {
             Job::Stop(_) if self.expires_stops => Reply::Stopped(Err(port_error(PortError::Expired))),
@@ -292,7 +311,7 @@ impl Paper {
                     self.status.direction = Some(direction);
                     self.lease = Some(Lease::new(direction, 0x000F));
                 }
-                Reply::started(slave(), direction, self.status())
+                Reply::started(slave(), direction, self.status().map_err(of_a_write))
             }
             Job::SetSetpoint(setpoint, _) => {
                 if reached && self.obeys {
@@ -306,20 +325,20 @@ impl Paper {
                     let status = Box::new(self.status.clone());
                     return Reply::Setpoint(Err(Error::NotConfirmed { slave, command, status, because }));
                 }
-                Reply::Setpoint(self.result(()))
+                Reply::Setpoint(self.result(()).map_err(of_a_write))
             }
             Job::ResetFaults => {
                 if reached && self.obeys {
                     self.stand();
                     self.status.fault_code = None;
                 }
-                Reply::Ordered(self.status())
+                Reply::Ordered(self.status().map_err(of_a_write))
             }
             Job::Release => {
                 self.status.control = Some(Control::Terminals);
-                Reply::Ordered(self.status())
+                Reply::Ordered(self.status().map_err(of_a_write))
             }
-            Job::Persist => Reply::Saved(self.result(1)),
+            Job::Persist => Reply::Saved(self.result(1).map_err(of_a_write)),
             Job::ArmWatchdog(..) if self.refuses_watchdog => Reply::Watchdog(Err(not_now(6005))),
             Job::ArmWatchdog(..) if self.denies_watchdog => {
                 let (slave, command) = (slave(), Command::Configure("watchdog"));

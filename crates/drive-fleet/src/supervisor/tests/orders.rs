@@ -177,6 +177,34 @@ fn a_start_that_the_drive_denies_is_not_confirmed_not_repeated_and_taken_back_by
     assert_eq!(rig.drive.writes(), [Job::Start(Direction::Forward), Job::Stop(StopMode::Ramp)]);
 }
 
+/// A reading that comes before the first write was not answered: nothing stands in the drive that would have to be taken back.
+#[test]
+fn an_order_that_fails_before_anything_is_written_is_refused_and_takes_nothing_back() {
+    for order in [START, setpoint(30), Order::ResetFaults] {
+        let mut rig = Rig::ready();
+        rig.drive.reads_in_vain = true;
+        let id = rig.order(order);
+        rig.pass(8_000 * MS);
+        assert!(
+            matches!(rig.outcome(id), Some(Outcome::Refused(Refused::Drive(_)))),
+            "{:?}",
+            rig.outcome(id)
+        );
+        assert_eq!(rig.drive.writes().len(), 1, "it is not asked for again, and no stop takes it back");
+    }
+}
+
+/// What runs by a command of before shows nothing of a start the other way that the line has lost.
+#[test]
+fn a_lost_start_the_other_way_is_not_confirmed_by_the_run_command_that_stands() {
+    let mut rig = Rig::running_at(25);
+    rig.drive.loses_answer = true;
+    rig.drive.obeys = false;
+    let id = rig.order(Order::Start { direction: Direction::Reverse, setpoint: None, until: Until::InForce });
+    rig.pass(8_000 * MS);
+    assert!(matches!(rig.outcome(id), Some(Outcome::NotConfirmed(_))), "{:?}", rig.outcome(id));
+}
+
 #[test]
 fn a_start_whose_drive_goes_mute_has_an_unknown_outcome_and_the_drive_is_stopped_when_it_is_back() {
     let mut rig = Rig::ready();
