@@ -8,13 +8,15 @@ use super::{
     Answers, Desk, Refusal,
     alarms_answer::AlarmsOrder,
     counter::{Named, Order},
-    judge_time,
 };
 use drived_doors::{
     Caller,
     audit::{Kind, Record},
 };
-use drived_plant::plant::{alarms::AlarmsSaid, commands::LIFETIME};
+use drived_plant::plant::{
+    alarms::AlarmsSaid,
+    commands::{LIFETIME, age::age_of},
+};
 
 /// A message about alarms, as a broker's face has it.
 pub struct AlarmMessage<A> {
@@ -45,8 +47,8 @@ impl<A: Answers + Sync> Desk<A> {
         let judged = match doubt {
             Some(doubt) => Err(doubt),
             None => asked.map_err(Refusal::from).and_then(|asked| {
-                judge_time([sent_unix_ms, issued_unix_ms], arrived, LIFETIME.time(), Duration::ZERO)
-                    .map(|_| asked)
+                age_of([sent_unix_ms, issued_unix_ms], arrived, LIFETIME.time(), Duration::ZERO)?;
+                Ok(asked)
             }),
         };
         let order = match judged {

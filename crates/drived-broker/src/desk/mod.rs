@@ -34,15 +34,12 @@ use drived_doors::{
 };
 use drived_plant::plant::{
     Plant,
-    commands::{Action, Asked, LIFETIME, LONGEST_LIFETIME, Lifetime, Request, Said, Target},
+    commands::{Action, Asked, LIFETIME, LONGEST_LIFETIME, Lifetime, Request, Said, Target, age::age_of},
     views::CommandView,
 };
-use drived_words::json::{milliseconds, unix};
 
 /// Commands that wait for the audit log.
 const WAITING: usize = 64;
-/// How far the clock of somebody who says when a command was issued may be ahead.
-const AHEAD: Duration = Duration::from_secs(1);
 /// In a flood, a stop that comes so soon after the same one has nothing to add.
 const SAME_STOP: Duration = Duration::from_millis(50);
 
@@ -167,12 +164,11 @@ impl<A: Answers + Sync> Desk<A> {
         if let Some(doubt) = message.doubt {
             return Err(doubt);
         }
-        let Said { asked, issued_unix_ms, .. } = message.said;
-        let asked = asked?;
+        let asked = message.said.asked?;
         if drive_fleet::mutant!("all-are-commanded", target == Target::All, false) {
             return Err(Refusal::malformed("all drives can be stopped together, and nothing else"));
         }
-        let says_itself = asked.expires_in_ms.is_some();
+        let (says_itself, issued) = (asked.expires_in_ms.is_some(), asked.issued_unix_ms);
         let asked = Asked { id, ..asked };
         let mut request = asked.of(target, message.arrived).map_err(Refusal::malformed)?;
         let longest = message.longest.map(|longest| longest.min(LONGEST_LIFETIME));
@@ -183,8 +179,8 @@ impl<A: Answers + Sync> Desk<A> {
             (false, None) => message.lifetime,
         };
         // Its time has run since it was sent; and the same command is the same again, whenever it comes.
-        let age = judge_time(
-            [message.sent_unix_ms, issued_unix_ms],
+        let age = age_of(
+            [message.sent_unix_ms, issued],
             message.arrived,
             request.lifetime.time(),
             self.counter.clock_set_back(),
@@ -202,49 +198,5 @@ impl<A: Answers + Sync> Desk<A> {
     fn record(&self, message: &Message<A>) -> Record {
         let body = Some(message.said.body.clone()).filter(|body| *body != Value::Null);
         Record { body, ..Record::new(Kind::Command, &message.caller, message.what.clone()) }
-    }
-}
-
-/// How old a message is that says when it was sent, within its lifetime. Where this computer's clock was set back since, it may be older by
-/// that.
-fn judge_time(
-    sent: [Option<u64>; 2],
-    arrived: Instant,
-    lifetime: Duration,
-    set_back: Duration,
-) -> Result<Duration, Refusal> {
-    let Some(sent) = sent.into_iter().flatten().min() else { return Ok(Duration::ZERO) };
-    let age = drive_fleet::mutant!("old-command-moves", age(sent, arrived)?, Duration::ZERO);
-    match age {
-        age if age >= lifetime => Err(Refusal::Expired { age, lifetime }),
-        age if age + set_back >= lifetime => Err(Refusal::ClockSetBack(set_back)),
-        age => Ok(age),
-    }
-}
-
-/// How old something is that was sent then, by a clock that may differ.
-fn age(sent_unix_ms: u64, arrived: Instant) -> Result<Duration, Refusal> {
-    let now = unix(arrived);
-    let ahead = sent_unix_ms.saturating_sub(now);
-    if ahead > milliseconds(AHEAD) {
-        return Err(Refusal::malformed(format!("it was sent {ahead} ms in the future: the clocks differ")));
-    }
-    Ok(Duration::from_millis(now.saturating_sub(sent_unix_ms)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[tokio::test]
-    async fn what_says_when_it_was_sent_may_be_older_by_what_the_clock_was_set_back() {
-        let (now, second) = (Instant::now(), Duration::from_secs(1));
-        let judge = |age: u64, set_back| judge_time([None, Some(unix(now) - age)], now, second, set_back);
-        assert!(judge(100, Duration::ZERO).is_ok_and(|age| age < second));
-        assert!(judge(100, Duration::from_millis(300)).is_ok());
-        assert!(matches!(judge(100, Duration::from_secs(5)), Err(Refusal::ClockSetBack(_))));
-        assert!(matches!(judge(5_000, Duration::from_secs(5)), Err(Refusal::Expired { .. })));
-        // What says nothing of when it was sent has another proof of its age.
-        assert!(judge_time([None, None], now, second, Duration::from_secs(5)).is_ok());
     }
 }

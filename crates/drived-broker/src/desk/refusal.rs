@@ -1,7 +1,5 @@
 //! Why a message does nothing, in the same words at every broker.
 
-use std::time::Duration;
-
 use serde::Serialize;
 
 use drived_plant::plant::{
@@ -21,19 +19,12 @@ pub enum Refusal {
     Retained,
     #[error("the connection to the broker has stalled, and nobody can say how old it is")]
     Late,
-    #[error(
-        "the clock of this computer was set back by {:.1} s a moment ago, and nobody can say how old it is",
-        .0.as_secs_f64()
-    )]
-    ClockSetBack(Duration),
     #[error("the births have not been told: nobody can know what it writes")]
     NotBorn,
     #[error("nobody can say which drive is meant: {0}")]
     NamesLost(String),
     #[error(transparent)]
     Unclear(#[from] Unclear),
-    #[error("it is {} ms old, and was to be carried out within {} ms", .age.as_millis(), .lifetime.as_millis())]
-    Expired { age: Duration, lifetime: Duration },
     #[error(
         "expected an id: without one it may come again when nobody expects it, and its outcome is not found"
     )]
@@ -56,12 +47,11 @@ impl Refusal {
     /// The outcome and the reason, a word each.
     pub const fn told(&self) -> (OutcomeWord, &'static str) {
         let reason = match self {
-            Self::Expired { .. } => return (OutcomeWord::Expired, "expired"),
             Self::Rejected(rejected) => return rejected.told(),
             Self::NotFound => "not_found",
             Self::ReadOnly(_) => "read_only",
             Self::Retained => "retained",
-            Self::Late | Self::ClockSetBack(_) => "late",
+            Self::Late => "late",
             Self::NotBorn => "not_born",
             Self::NamesLost(_) => "names_lost",
             Self::Unclear(Unclear::Ambiguous(_)) => "ambiguous",

@@ -22,7 +22,7 @@ use super::{
 use drived_doors::Caller;
 use drived_plant::plant::{
     Plant,
-    commands::{Action, Asks, LIFETIME, OutcomeWord, Request, Said, Target},
+    commands::{Action, Asks, LIFETIME, OutcomeWord, Request, Said, Target, age::age_of},
     views::CommandView,
 };
 
@@ -35,7 +35,7 @@ pub(super) async fn to_drive<B: Asks>(
     Named(name): Named,
     Sent(body): Sent<B>,
 ) -> Result<Response, Problem> {
-    let request = request(Target::Drive(name), body, arrived)?;
+    let request = request(&plant, &caller, Target::Drive(name), body, arrived)?;
     carry_out(&plant, &caller, request, wait).await
 }
 
@@ -48,7 +48,7 @@ pub(super) async fn to_group<B: Asks>(
     Named(name): Named,
     Sent(body): Sent<B>,
 ) -> Result<Response, Problem> {
-    let request = request(Target::Group(name), body, arrived)?;
+    let request = request(&plant, &caller, Target::Group(name), body, arrived)?;
     carry_out(&plant, &caller, request, wait).await
 }
 
@@ -60,7 +60,7 @@ pub(super) async fn to_selected<B: Asks>(
     Wait(wait): Wait,
     Sent(Selected { drives, body }): Sent<Selected<B>>,
 ) -> Result<Response, Problem> {
-    let request = request(Target::Selected(drives), body, arrived)?;
+    let request = request(&plant, &caller, Target::Selected(drives), body, arrived)?;
     carry_out(&plant, &caller, request, wait).await
 }
 
@@ -121,8 +121,21 @@ pub(super) async fn command(
     command.map(Json).ok_or_else(|| Problem::not_found(format!("there is no command {id:?} any more")))
 }
 
-fn request(target: Target, body: impl Asks, arrived: Instant) -> Result<Request, Problem> {
-    body.asked().of(target, arrived).map_err(Problem::unprocessable)
+/// The request of a body. One that says when it was issued may have been on its way for as long: its time counts from then.
+fn request(
+    plant: &Plant,
+    caller: &Caller,
+    target: Target,
+    body: impl Asks,
+    arrived: Instant,
+) -> Result<Request, Problem> {
+    let asked = body.asked();
+    let issued = [asked.issued_unix_ms, None];
+    let mut request = asked.of(target, arrived).map_err(Problem::unprocessable)?;
+    let age = age_of(issued, arrived, request.lifetime.time(), plant.clock_set_back())
+        .map_err(|rejected| Problem::rejected(&rejected, caller))?;
+    request.arrived = arrived.checked_sub(age).unwrap_or(arrived);
+    Ok(request)
 }
 
 fn stop(target: Target, said: Said, arrived: Instant) -> Request {

@@ -136,7 +136,13 @@ impl Problem {
             Rejected::NoRight { right, .. } => Self::lacks_right(caller, right),
             Rejected::OutOfScope { drive, .. } => Self::out_of_scope(caller, drive),
             Rejected::NoDrive(_) | Rejected::NoGroup(_) => Self::not_found(detail),
-            Rejected::Stopped(_) | Rejected::Otherwise(_) | Rejected::Closing | Rejected::IdReused(_) => {
+            Rejected::FromTheFuture(_) => Self::unprocessable(detail),
+            Rejected::Stopped(_)
+            | Rejected::Otherwise(_)
+            | Rejected::Closing
+            | Rejected::TooOld { .. }
+            | Rejected::ClockSetBack(_)
+            | Rejected::IdReused(_) => {
                 let (outcome, reason) = rejected.told();
                 let why = Some(Why::Refused(Refused { outcome, reason }));
                 Self { kind: REFUSED, why, ..Self::new(StatusCode::CONFLICT, detail) }

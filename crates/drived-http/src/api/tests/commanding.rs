@@ -11,6 +11,7 @@ use tokio::time::{Instant, sleep, timeout};
 use super::*;
 use drived_config::config::Group;
 use drived_doors::Scope;
+use drived_words::json::unix;
 
 const RUN: &str = "/api/v1/drives/pump%201/start";
 const STOP: &str = "/api/v1/drives/pump%201/stop";
@@ -60,6 +61,34 @@ async fn every_verb_is_carried_out_and_its_outcome_told() {
     let (status, release) = command(&plant.plant, "/api/v1/drives/pump%201/release", &json!({})).await;
     let told = get(&plant.plant, &format!("/api/v1/commands/{}", release["id"].as_str().unwrap())).await.1;
     assert_eq!(told["outcome"], release["outcome"], "{status} {release}");
+}
+
+/// A start that a network has kept: nobody knows when it was wished but by what it says itself.
+#[tokio::test(start_paused = true)]
+async fn a_start_that_says_when_it_was_issued_is_not_begun_behind_a_stop_since_nor_when_its_time_is_over() {
+    let plant = TestPlant::of(1).await;
+    let issued = |ago: u64| json!({"issued_unix_ms": unix(Instant::now()) - ago, "expires_in_ms": 5_000});
+    let (_, stop) =
+        send(api(&plant.plant, "another", ALL), post(&format!("{STOP}?wait=20s"), &json!({}))).await;
+    assert_eq!(stop["outcome"], "confirmed", "{stop}");
+    sleep(Duration::from_millis(1_000)).await;
+    let (status, late) = command(&plant.plant, RUN, &issued(2_000)).await;
+    assert_eq!((status, &late["outcome"]), (StatusCode::CONFLICT, &"superseded".into()), "{late}");
+    for verb in ["start", "setpoint", "reset", "release", "save"] {
+        let mut body = issued(5_500);
+        if verb == "setpoint" {
+            body["setpoint"] = json!({"frequency_hz": 20.0});
+        }
+        let (status, old) = command(&plant.plant, &format!("/api/v1/drives/pump%201/{verb}"), &body).await;
+        assert_eq!((status, &old["outcome"]), (StatusCode::CONFLICT, &"expired".into()), "{verb}: {old}");
+    }
+    assert!(!is_running(&plant, 0));
+    let (status, ahead) =
+        command(&plant.plant, RUN, &json!({"issued_unix_ms": unix(Instant::now()) + 60_000})).await;
+    assert_eq!(status, StatusCode::UNPROCESSABLE_ENTITY, "{ahead}");
+    sleep(Duration::from_millis(5_000)).await;
+    let (status, start) = command(&plant.plant, RUN, &issued(500)).await;
+    assert_eq!((status, &start["outcome"]), (StatusCode::OK, &"confirmed".into()), "{start}");
 }
 
 #[tokio::test(start_paused = true)]

@@ -5,7 +5,7 @@ import { el, setClass, setText } from './dom.js';
 import { follow } from './follow.js';
 import { clock, duration } from './format.js';
 import { askToken } from './login.js';
-import { daemonNow } from './plant.js';
+import { daemonNow, start } from './plant.js';
 import { named, t } from './texts.js';
 import { told } from './told.js';
 import { word } from './vocabulary.js';
@@ -20,7 +20,7 @@ const LOOK_AGAIN_MS = 1_000;
 const ATTEMPT_MS = 2_000;
 const AGAIN_MS = 500;
 const GIVE_UP_MS = 60_000;
-/** What comes to a drive later than this is nobody's wish any more. */
+/** What comes to a drive later than this after it was pressed is nobody's wish any more: a network may have kept it. */
 const EXPIRES_MS = 5_000;
 
 const orders = [];
@@ -40,7 +40,7 @@ export function onOrder(listener) {
 /** Gives a command at this address, and ends when its outcome is known; what becomes of it later is told all the same. All but a stop expire. */
 export function command(to, action, where, asked = {}) {
   const id = commandId();
-  const body = action === 'stop' ? asked : { expires_in_ms: EXPIRES_MS, ...asked };
+  const body = action === 'stop' ? asked : { expires_in_ms: EXPIRES_MS, issued_unix_ms: Math.round(daemonNow()), ...asked };
   const within = action === 'stop' ? ATTEMPT_MS : undefined;
   return carryOut(to, action, () => post(`${where}?wait=0`, { id, ...body }, 'POST', within), id);
 }
@@ -140,6 +140,8 @@ function take(order, answer) {
 
 function fail(order, problem) {
   if (problem.lacksRight) askToken();
+  // The daemon's clock may have been set since it was read.
+  if (problem.document?.outcome === 'expired' || problem.status === 422) start();
   if (problem.document?.outcome) {
     take(order, { text: problem.message, ...problem.document });
     return problem.document;

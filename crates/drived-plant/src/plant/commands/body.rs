@@ -25,6 +25,8 @@ pub trait Asks: DeserializeOwned + Send + 'static {
 pub struct Asked {
     pub id: Option<String>,
     pub expires_in_ms: Option<u64>,
+    /// When it was issued, as it says itself.
+    pub issued_unix_ms: Option<u64>,
     pub expects: Option<Expects>,
     pub action: Action,
 }
@@ -57,7 +59,7 @@ impl Asked {
     /// # Errors
     /// What is wrong with its id or its expiry, in words.
     pub fn of(self, target: Target, arrived: Instant) -> Result<Request, String> {
-        let Self { id, expires_in_ms, expects, action } = self;
+        let Self { id, expires_in_ms, expects, action, .. } = self;
         if id.as_ref().is_some_and(|id| !is_id(id)) {
             return Err(format!("id: expected 1 to {LONGEST_ID} printable ASCII characters without spaces"));
         }
@@ -84,6 +86,8 @@ pub struct Start {
     /// After this time from its arrival nothing of it is sent any more; unless it is said, it begins within 1000, and ends 2000 later.
     #[schemars(range(min = 1, max = 10_000))]
     expires_in_ms: Option<u64>,
+    /// When it was issued, by a clock that agrees with the daemon's: its time counts from then, and a stop since then goes before it.
+    issued_unix_ms: Option<u64>,
     /// What was shown of the drives: it is carried out so, or refused.
     expects: Option<Expects>,
     /// `forward` unless it is said.
@@ -121,6 +125,8 @@ pub struct NewSetpoint {
     /// After this time from its arrival it is not sent any more; 1000 unless it is said.
     #[schemars(range(min = 1, max = 10_000))]
     expires_in_ms: Option<u64>,
+    /// When it was issued, by a clock that agrees with the daemon's: its time counts from then, and a stop since then goes before it.
+    issued_unix_ms: Option<u64>,
     /// What was shown of the drives: it is carried out so, or refused.
     expects: Option<Expects>,
     setpoint: Setpoint,
@@ -138,6 +144,8 @@ pub struct Plain {
     /// After this time from its arrival it is not sent any more; 1000 unless it is said.
     #[schemars(range(min = 1, max = 10_000))]
     expires_in_ms: Option<u64>,
+    /// When it was issued, by a clock that agrees with the daemon's: its time counts from then, and a stop since then goes before it.
+    issued_unix_ms: Option<u64>,
     /// What was shown of the drives: it is carried out so, or refused.
     expects: Option<Expects>,
 }
@@ -159,17 +167,18 @@ pub struct Release(Plain);
 
 impl Asks for Start {
     fn asked(self) -> Asked {
-        let Self { id, expires_in_ms, expects, direction, setpoint, until } = self;
+        let Self { id, expires_in_ms, issued_unix_ms, expects, direction, setpoint, until } = self;
         let (direction, until) = (direction.unwrap_or(Direction::Forward), until.unwrap_or_default());
-        Asked { id, expires_in_ms, expects, action: Action::Start { direction, setpoint, until } }
+        let action = Action::Start { direction, setpoint, until };
+        Asked { id, expires_in_ms, issued_unix_ms, expects, action }
     }
 }
 
 impl Asks for NewSetpoint {
     fn asked(self) -> Asked {
-        let Self { id, expires_in_ms, expects, setpoint, until } = self;
+        let Self { id, expires_in_ms, issued_unix_ms, expects, setpoint, until } = self;
         let action = Action::Setpoint { setpoint, until: until.unwrap_or_default() };
-        Asked { id, expires_in_ms, expects, action }
+        Asked { id, expires_in_ms, issued_unix_ms, expects, action }
     }
 }
 
@@ -193,7 +202,7 @@ impl Asks for Save {
 
 impl Plain {
     fn asked_to(self, action: Action) -> Asked {
-        let Self { id, expires_in_ms, expects } = self;
-        Asked { id, expires_in_ms, expects, action }
+        let Self { id, expires_in_ms, issued_unix_ms, expects } = self;
+        Asked { id, expires_in_ms, issued_unix_ms, expects, action }
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! A command goes on when whoever asked for it has gone. A stop never expires, and is carried out each time it arrives.
 
+pub mod age;
 mod body;
 mod carry;
 mod expected;
@@ -125,6 +126,15 @@ pub enum Rejected {
     Otherwise(Otherwise),
     #[error("the daemon is about to end: until it has, only stops are carried out")]
     Closing,
+    #[error("it is {} ms old, and was to be carried out within {} ms", .age.as_millis(), .lifetime.as_millis())]
+    TooOld { age: Duration, lifetime: Duration },
+    #[error(
+        "the clock of this computer was set back by {:.1} s a moment ago, and nobody can say how old it is",
+        .0.as_secs_f64()
+    )]
+    ClockSetBack(Duration),
+    #[error("it was sent {0} ms in the future: the clocks differ")]
+    FromTheFuture(u64),
     #[error("the id {0:?} was used for another command: expected one that is new, or the same command")]
     IdReused(String),
 }
@@ -138,6 +148,9 @@ impl Rejected {
             Self::Stopped(_) => (OutcomeWord::Superseded, "stop"),
             Self::Otherwise(_) => (OutcomeWord::Refused, "not_as_shown"),
             Self::Closing => (OutcomeWord::Refused, "closing"),
+            Self::TooOld { .. } => (OutcomeWord::Expired, "expired"),
+            Self::ClockSetBack(_) => (OutcomeWord::Refused, "late"),
+            Self::FromTheFuture(_) => (OutcomeWord::Refused, "malformed"),
             Self::IdReused(_) => (OutcomeWord::Refused, "id_reused"),
         }
     }

@@ -25,13 +25,11 @@ pub struct Said {
     /// What it names, whether or not it can be understood.
     pub action: Option<ActionWord>,
     pub id: Option<String>,
-    /// When it was issued, as it says itself.
-    pub issued_unix_ms: Option<u64>,
     pub asked: Result<Asked, Unclear>,
 }
 
 impl Said {
-    /// An object with its `action` and perhaps `issued_unix_ms` beside the body of the API.
+    /// An object with its `action` beside the body of the API.
     pub fn of(text: &str) -> Self {
         if text.trim() == STOP {
             return Self::plain(Action::Stop(StopMode::Ramp.into()), Value::from(text));
@@ -47,11 +45,7 @@ impl Said {
             return Self { id, ..Self::stop(&object) };
         }
         let action = object.one("action").and_then(|action| serde_json::from_value(action.clone()).ok());
-        let (asked, issued_unix_ms) = match asked(&object) {
-            Ok((asked, issued)) => (Ok(asked), issued),
-            Err(unclear) => (Err(unclear), None),
-        };
-        Self { body, action, id, issued_unix_ms, asked }
+        Self { body, action, id, asked: asked(&object) }
     }
 
     /// What came where everything is a stop: a mode that is said once is taken, and else it is the ramp.
@@ -82,13 +76,13 @@ impl Said {
 
     /// What is asked for without an object.
     pub fn plain(action: Action, body: Value) -> Self {
-        let asked = Asked { id: None, expires_in_ms: None, expects: None, action };
-        Self { body, action: Some(action.word()), id: None, issued_unix_ms: None, asked: Ok(asked) }
+        let asked = Asked { id: None, expires_in_ms: None, issued_unix_ms: None, expects: None, action };
+        Self { body, action: Some(action.word()), id: None, asked: Ok(asked) }
     }
 
     /// What cannot be understood.
     pub const fn unclear(unclear: Unclear, body: Value) -> Self {
-        Self { body, action: None, id: None, issued_unix_ms: None, asked: Err(unclear) }
+        Self { body, action: None, id: None, asked: Err(unclear) }
     }
 
     /// What whoever asks was shown.
@@ -105,19 +99,17 @@ impl Said {
     }
 }
 
-/// What an object that is no stop asks for, and when it was issued.
-fn asked(object: &Object) -> Result<(Asked, Option<u64>), Unclear> {
+/// What an object that is no stop asks for.
+fn asked(object: &Object) -> Result<Asked, Unclear> {
     unambiguous(object)?;
     let mut members = strict(object.clone())?;
     let Some(Value::String(action)) = members.remove("action") else {
         return Err(Unclear::Malformed("expected \"action\"".to_owned()));
     };
-    let issued = members.remove("issued_unix_ms").map(|issued| {
-        let wrong = || Unclear::Malformed("issued_unix_ms: expected milliseconds since 1970".to_owned());
-        issued.as_u64().ok_or_else(wrong)
-    });
-    let asked = Asked::named(&action, members).map_err(Unclear::Malformed)?;
-    Ok((asked, issued.transpose()?))
+    if members.get("issued_unix_ms").is_some_and(|issued| !issued.is_u64()) {
+        return Err(Unclear::Malformed("issued_unix_ms: expected milliseconds since 1970".to_owned()));
+    }
+    Asked::named(&action, members).map_err(Unclear::Malformed)
 }
 
 fn mode(value: &Value) -> Option<StopMode> {
