@@ -36,7 +36,7 @@ settings! {
     snapshots: Parsed<Time> = "`\"5s\"`", |to, said| to.snapshots = snapshots(said.0.0)?;
     /// how long the exit may take
     shutdown: Parsed<Time> = "`\"60s\"`", |to, said| to.shutdown = said.0.0;
-    /// the folder of what outlives the daemon: `ballast`, `tokens`, `audit`, `runs.json`, `watched.json`, `watchdogs.json`, `eeprom.json`, `names.json`, `alarms.json`, `history.sqlite`, `added.toml`, `sessions.json`, `webhooks.json`, `sparkplug-bd-seq`, `lock`, and what belongs to one of these by its name; beside the configuration
+    /// the folder of what outlives the daemon: `ballast`, `tokens`, `audit`, `runs.json`, `watched.json`, `quick_stops.json`, `watchdogs.json`, `eeprom.json`, `names.json`, `alarms.json`, `history.sqlite`, `added.toml`, `sessions.json`, `webhooks.json`, `sparkplug-bd-seq`, `lock`, and what belongs to one of these by its name; beside the configuration
     /// unless the path is whole
     state: PathBuf = "the folder that systemd names in `STATE_DIRECTORY`; else one of this user for this configuration, in `$XDG_STATE_HOME/drived` or `~/.local/state/drived`",
         |to, said| to.kept.state = Some(said.clone());

@@ -7,7 +7,6 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use drive_core::{Intent, StopMode};
 use drive_fleet::Place;
 use tokio::time::Instant;
 
@@ -19,30 +18,6 @@ const KEPT: usize = 1_024;
 pub(super) enum Word {
     Run,
     WithoutRun,
-    /// A quick stop of the chart, behind which the drive is locked.
-    QuickStop,
-    /// One that disables the voltage, which ends that lock.
-    NoVoltage,
-}
-
-impl Word {
-    /// The word of what moves no motor.
-    pub(super) const fn of(intent: Intent) -> Self {
-        match intent {
-            Intent::Start(_) => Self::Run,
-            Intent::QuickStop => Self::QuickStop,
-            Intent::Stop(StopMode::Freewheel) | Intent::ResetFaults(_) => Self::NoVoltage,
-            Intent::Stop(_) | Intent::Prepare(_) | Intent::Setpoint(_) => Self::WithoutRun,
-        }
-    }
-
-    /// What counts of it behind this one.
-    const fn behind(self, before: Option<Self>) -> Self {
-        match (before, self) {
-            (Some(Self::QuickStop), Self::Run | Self::WithoutRun) => Self::QuickStop,
-            _ => self,
-        }
-    }
 }
 
 /// The clients of a gateway.
@@ -61,15 +36,10 @@ impl Clients {
         self.with(peer, now, |client| client.heard = now);
     }
 
-    /// A client has written a command word to a drive; gives the one before it, and when that was. A quick stop stands until the voltage
-    /// was disabled.
+    /// A client has written a command word to a drive; gives the one before it, and when that was.
     pub(super) fn write(&self, peer: IpAddr, drive: &Place, word: Word) -> Option<(Word, Instant)> {
         let now = Instant::now();
-        self.with(peer, now, |client| {
-            let before = client.words.get(drive).copied();
-            client.words.insert(drive.clone(), (word.behind(before.map(|(word, _)| word)), now));
-            before
-        })
+        self.with(peer, now, |client| client.words.insert(drive.clone(), (word, now)))
     }
 
     fn with<T>(&self, peer: IpAddr, now: Instant, act: impl FnOnce(&mut Client) -> T) -> T {

@@ -58,7 +58,7 @@ use drived_http::{
 use drived_plant::{
     counts::Source,
     findings, journal,
-    plant::{Plant, alarms::KeptAlarms, watched::Watched},
+    plant::{Plant, alarms::KeptAlarms, quick_stops::QuickStops, watched::Watched},
 };
 use drived_screen::screen::Screen;
 use drived_words::{
@@ -148,6 +148,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let names = Names::in_folder(config.doors.state.folder.as_deref());
     tell_names(&names, &config.lines, &config.groups);
     let alarms = KeptAlarms::in_folder(folder, &places).with_runs_of(kept.runs.clone());
+    let watched = (watched, QuickStops::in_folder(folder, &places));
     let plant = Plant::start_with(fleet.clone(), config.groups.clone(), false, &alarms, watched);
     plant.set_names(names.clone());
     let watched = plant.keep_watched();

@@ -47,9 +47,9 @@ struct Wanted {
     setpoint: Option<Setpoint>,
 }
 
-/// A stop that waits for nothing: by what its word asks, which stops a motor by this mode.
+/// A stop that waits for nothing, by this mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Stop(Intent, StopMode);
+pub(crate) struct Stop(StopMode);
 
 impl Desk {
     /// Whether a write stops the motor, so that it goes ahead of what waits: a word that is a stop; or one without a run
@@ -60,11 +60,20 @@ impl Desk {
             return self.broadcast_stop(ask);
         }
         let drive = self.drive(unit).filter(|_| self.config.rights.stop)?;
-        self.intents_without_reading(&drive, ask).find_map(|intent| match intent {
+        let by_a_word = self.intents_without_reading(&drive, ask).find_map(|intent| match intent {
             Intent::Prepare(_) if stands(&drive) => None,
             Intent::ResetFaults(_) if stands(&drive) || shows_fault(&drive) => None,
-            intent => intent.stops().map(|mode| Stop(intent, mode)),
-        })
+            intent => self.stops_by(&drive, intent),
+        });
+        by_a_word.map(Stop)
+    }
+
+    /// How what a word asks stops a motor that runs, if it does. In a quick stop of the chart no word acts but one that disables the
+    /// voltage: what else would stop it, as a shutdown that lets it coast, leaves it to that.
+    fn stops_by(&self, drive: &DriveHandle, intent: Intent) -> Option<StopMode> {
+        let mode = intent.stops()?;
+        let is_left = !disables_voltage(intent) && self.plant.quick_stops().locks(drive);
+        Some(if is_left { StopMode::Fast } else { mode })
     }
 
     /// To whom a write to a unit goes.
@@ -95,18 +104,15 @@ impl Desk {
         drives.iter().for_each(|drive| self.kept.forget(drive.place()));
         let written = match (stop, &drives[..]) {
             (Some(stop), [drive]) => {
-                self.clients.write(peer, drive.place(), Word::of(stop.0));
-                let stopped = self.stop(&caller, drive, stop.1, arrived).await;
+                let stopped = self.stop_as_asked((peer, &caller), drive, stop, ask, arrived).await;
                 match stopped {
                     Ok(()) => self.setpoint_beside(&caller, drive, ask, arrived).await,
                     refused => refused,
                 }
             }
             (Some(stop), drives) => {
-                let stops = drives.iter().map(|drive| {
-                    self.clients.write(peer, drive.place(), Word::of(stop.0));
-                    self.stop(&caller, drive, stop.1, arrived)
-                });
+                let stops =
+                    drives.iter().map(|drive| self.stop_as_asked((peer, &caller), drive, stop, ask, arrived));
                 join_all(stops).await.into_iter().collect()
             }
             (None, [drive]) if unit != 0 || self.drive(0).is_some() => {
@@ -119,6 +125,28 @@ impl Desk {
             self.tell_refusal(&caller, unit, ask, &refusal);
             refusal.code
         })
+    }
+
+    /// Stops a motor by what a client has written: a quick stop locks it from its word on, and one that disables the voltage ends that
+    /// once the drive has shown it.
+    async fn stop_as_asked(
+        &self,
+        (peer, caller): (IpAddr, &Caller),
+        drive: &DriveHandle,
+        Stop(mode): Stop,
+        ask: &Ask,
+        arrived: Instant,
+    ) -> Result<(), Refusal> {
+        self.clients.write(peer, drive.place(), Word::WithoutRun);
+        let asked: Vec<Intent> = self.intents_without_reading(drive, ask).collect();
+        if asked.contains(&Intent::QuickStop) {
+            self.plant.quick_stops().lock(drive);
+        }
+        self.stop(caller, drive, mode, arrived).await?;
+        if asked.iter().any(|intent| disables_voltage(*intent)) && !asked.contains(&Intent::QuickStop) {
+            self.plant.quick_stops().unlock(drive);
+        }
+        Ok(())
     }
 
     fn caller(&self, peer: IpAddr) -> Caller {
@@ -281,14 +309,18 @@ impl Desk {
                 self.start(peer, caller, drive, (direction, setpoint), action, (arrived, deadline)).await
             }
             Some(Intent::ResetFaults(_)) if shows_fault(drive) => {
-                self.clients.write(peer, drive.place(), Word::NoVoltage);
-                self.order(caller, drive, Action::Reset, arrived, deadline).await
+                self.clients.write(peer, drive.place(), Word::WithoutRun);
+                self.order(caller, drive, Action::Reset, arrived, deadline).await?;
+                self.plant.quick_stops().unlock(drive);
+                Ok(())
             }
             Some(step) => {
-                self.clients.write(peer, drive.place(), Word::of(step));
-                match step.stops().filter(|_| !stands(drive)) {
+                self.clients.write(peer, drive.place(), Word::WithoutRun);
+                match self.stops_by(drive, step).filter(|_| !stands(drive)) {
                     // It was started while this waited.
-                    Some(mode) => self.stop(caller, drive, mode, arrived).await?,
+                    Some(mode) => {
+                        self.stop_as_asked((peer, caller), drive, Stop(mode), ask, arrived).await?;
+                    }
                     None => self.prepare(drive, ask, arrived).await?,
                 }
                 match setpoint.filter(|setpoint| drive.snapshot().setpoint != Some(*setpoint)) {
@@ -327,15 +359,15 @@ impl Desk {
                 None => Ok(()),
             };
         }
+        if self.plant.quick_stops().locks(drive) {
+            return Err(Refusal::rule(
+                "behind a quick stop a drive is locked until its voltage was disabled: write 0000h first",
+            ));
+        }
         // What was wished before a stop of somebody else is not wished behind it.
         let asked_after = match before {
             _ if runs => arrived,
-            Some((Word::WithoutRun | Word::NoVoltage, at)) => at,
-            Some((Word::QuickStop, _)) => {
-                return Err(Refusal::rule(
-                    "behind a quick stop a drive is locked until its voltage was disabled: write 0000h first",
-                ));
-            }
+            Some((Word::WithoutRun, at)) => at,
             _ => {
                 return Err(Refusal::rule(
                     "nothing starts by a run command that only goes on: write one without run first",
@@ -524,6 +556,11 @@ pub(crate) fn watched(config: &GatewayConfig) -> WatchedDoor<'_> {
     WatchedDoor { name, listen: *listen, limit: *client_timeout, stops: *stops_when_silent }
 }
 
+/// Whether a word disables the voltage, which ends the lock behind a quick stop (BBV51701 p. 10 to 12).
+const fn disables_voltage(intent: Intent) -> bool {
+    matches!(intent, Intent::Stop(StopMode::Freewheel) | Intent::ResetFaults(_))
+}
+
 fn busy() -> Refusal {
     Refusal::new(ExceptionCode::ServerDeviceBusy, "the line had no room in time")
 }
@@ -553,7 +590,7 @@ fn stop_of_all(intents: impl Iterator<Item = Intent>) -> Option<Stop> {
     for intent in intents {
         match intent {
             Intent::Start(_) => return None,
-            other => first = first.or(other.stops().map(|mode| Stop(other, mode))),
+            other => first = first.or(other.stops().map(Stop)),
         }
     }
     first
@@ -569,7 +606,7 @@ mod tests {
     fn words_for_one_family_stop_every_drive_of_a_gateway_that_none_of_them_starts() {
         let stop = Intent::Stop(StopMode::Freewheel);
         assert_eq!(stop_of_all([].into_iter()), None, "nobody understands it");
-        assert_eq!(stop_of_all([stop, stop].into_iter()), Some(Stop(stop, StopMode::Freewheel)));
+        assert_eq!(stop_of_all([stop, stop].into_iter()), Some(Stop(StopMode::Freewheel)));
         assert_eq!(stop_of_all([Intent::Start(Direction::Forward), stop].into_iter()), None);
         assert_eq!(stop_of_all([stop, Intent::Start(Direction::Reverse)].into_iter()), None);
     }

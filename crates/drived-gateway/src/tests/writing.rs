@@ -108,6 +108,58 @@ async fn no_run_command_starts_a_motor_behind_a_quick_stop_before_its_voltage_wa
     assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
 }
 
+/// The lock is the drive's, and no client's: neither another address, nor another gateway, nor one that a reload has opened anew gets past it.
+#[tokio::test(start_paused = true)]
+async fn a_quick_stop_by_one_client_locks_the_drive_for_every_client_of_every_gateway() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let mut peer = Peer::of(&desk);
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &write_two(CMD, [0x000F, 300])).await[0], 0x10);
+    sleep(Duration::from_secs(10)).await;
+    let config = GatewayConfig { name: "other".to_owned(), ..desk.config.clone() };
+    let names = super::names(&plant);
+    let second = Desk::new(config, plant.plant.clone(), Audit::default(), names);
+    let mut others = [
+        Peer::at(&desk, "127.0.0.2".parse().unwrap()),
+        Peer::of(&second),
+        Peer::at(&second, "127.0.0.2".parse().unwrap()),
+    ];
+    assert_eq!(peer.ask(1, &write(CMD, 0x0002)).await, write(CMD, 0x0002));
+    sleep(Duration::from_secs(10)).await;
+    for other in &mut others {
+        for word in [0x0006, 0x0007, 0x000F] {
+            let answer = other.ask(1, &write(CMD, word)).await;
+            assert_eq!(answer == [0x86, 0x04], word == 0x000F, "{word:04X}h: {answer:02X?}");
+            assert!(!plant.machines[0].observe().running, "{word:04X}h");
+        }
+    }
+    // Whoever disables the voltage ends it for all.
+    climb(&mut others[0], 1).await;
+    let [_, third, _] = &mut others;
+    assert_eq!(third.ask(1, &write(CMD, 0x0007)).await, write(CMD, 0x0007));
+    assert_eq!(third.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+    assert!(plant.machines[0].observe().running);
+}
+
+/// "Quick stop active" is left by 0000h alone (BBV51701 p. 10, transition 12): a shutdown, which lets a motor coast else, does not touch it.
+#[tokio::test(start_paused = true)]
+async fn no_step_of_the_ladder_lets_a_motor_coast_out_of_its_quick_stop() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let mut peer = Peer::of(&desk);
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &write_two(CMD, [0x000F, 500])).await[0], 0x10);
+    sleep(Duration::from_secs(20)).await;
+    assert_eq!(peer.ask(1, &write(CMD, 0x0002)).await, write(CMD, 0x0002));
+    for word in [0x0006, 0x0007, 0x100F] {
+        assert!(plant.machines[0].observe().output_frequency > 0, "{word:04X}h comes on its way down");
+        assert_eq!(peer.ask(1, &write(CMD, word)).await, write(CMD, word));
+        assert!(plant.machines[0].observe().output_frequency > 0, "{word:04X}h has cut the output");
+    }
+    assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, [0x86, 0x04]);
+    sleep(Duration::from_secs(10)).await;
+    assert!(!plant.machines[0].observe().running);
+}
+
 #[tokio::test(start_paused = true)]
 async fn setpoint_and_run_command_in_one_write_are_one_order() {
     let (plant, desk) = operated(1, |_| {}).await;

@@ -8,6 +8,7 @@ pub mod parameters;
 pub mod past;
 mod progress;
 mod pulse;
+pub mod quick_stops;
 pub mod recent;
 pub mod revisions;
 pub mod tally;
@@ -51,6 +52,7 @@ use self::{
     parameters::Words,
     progress::Progress,
     pulse::Pulse,
+    quick_stops::QuickStops,
     recent::{Recent, RecentView},
     revisions::Revisions,
     tally::Tally,
@@ -101,6 +103,7 @@ struct Inner {
     has_kept_past: AtomicBool,
     untold: RwLock<Option<Arc<dyn untold::Untold>>>,
     watched: Watched,
+    quick_stops: QuickStops,
 }
 
 impl Plant {
@@ -112,16 +115,22 @@ impl Plant {
 
     /// A plant whose alarms live as long as the program.
     pub fn start(fleet: Fleet, groups: Vec<Group>, demo: bool) -> Self {
-        Self::start_with(fleet, groups, demo, &KeptAlarms::default(), Watched::default())
+        Self::start_with(
+            fleet,
+            groups,
+            demo,
+            &KeptAlarms::default(),
+            (Watched::default(), QuickStops::default()),
+        )
     }
 
-    /// A plant that goes on with the alarms that were kept, and with those who have to be heard.
+    /// A plant that goes on with the alarms that were kept, with those who have to be heard, and with the drives that are locked.
     pub fn start_with(
         fleet: Fleet,
         groups: Vec<Group>,
         demo: bool,
         kept: &KeptAlarms,
-        watched: Watched,
+        (watched, quick_stops): (Watched, QuickStops),
     ) -> Self {
         let inner = Arc::new(Inner {
             fleet,
@@ -149,6 +158,7 @@ impl Plant {
             has_kept_past: AtomicBool::new(false),
             untold: RwLock::default(),
             watched,
+            quick_stops,
         });
         watching::start(&inner);
         tokio::spawn(pulse::beat(Arc::downgrade(&inner)));
@@ -328,6 +338,7 @@ impl Plant {
         self.rename_alarms(old, new);
         if let Some(drive) = self.0.fleet.drive(new) {
             self.0.watched.call(drive.place(), new);
+            self.0.quick_stops.call(&drive);
         }
     }
 

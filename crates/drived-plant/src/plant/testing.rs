@@ -19,7 +19,7 @@ use drive_sim::{SimLine, SimSlave, Wiring};
 use drive_testing::witness::Witnesses;
 use tokio::time::Instant;
 
-use super::{Plant, alarms::KeptAlarms, views::DriveView, watched::Watched};
+use super::{Plant, alarms::KeptAlarms, views::DriveView};
 use drived_config::config::Group;
 
 /// One line, named `north`, with Altivar 312: `pump 1`, `pump 2` … in the group `pumps`.
@@ -70,7 +70,7 @@ impl TestPlant {
         let fleet = builder.start().unwrap();
         let witnesses = Witnesses::of_fleet(&fleet, [("north", &line)]);
         let groups = vec![Group { name: "pumps".to_owned(), drives: names }];
-        let plant = Plant::start_with(fleet, groups, false, kept, Watched::default());
+        let plant = Plant::start_with(fleet, groups, false, kept, Default::default());
         for drive in plant.fleet().drives() {
             let _ = drive.ready(Duration::from_secs(10)).await;
         }

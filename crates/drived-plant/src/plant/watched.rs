@@ -395,7 +395,7 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::plant::{alarms::KeptAlarms, testing::TestPlant};
+    use crate::plant::{alarms::KeptAlarms, quick_stops::QuickStops, testing::TestPlant};
     use drived_config::testing::Folder;
 
     #[tokio::test(start_paused = true)]
@@ -407,7 +407,13 @@ mod tests {
         let open = |runs: bool| Watched::in_folder(Some(&place), &there, move |_| runs);
         let known = |watched: &Watched| watched.lock().keys().map(Place::to_string).collect::<Vec<_>>();
         let kept = KeptAlarms::default();
-        let plant = Plant::start_with(test.plant.fleet(), Vec::new(), false, &kept, open(true));
+        let plant = Plant::start_with(
+            test.plant.fleet(),
+            Vec::new(),
+            false,
+            &kept,
+            (open(true), QuickStops::default()),
+        );
         let keeping = plant.keep_watched();
         let door = |limit| WatchedDoor {
             name: "scada",

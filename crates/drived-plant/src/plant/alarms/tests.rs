@@ -7,7 +7,7 @@ use drive_sim::SimSlave;
 use tokio::time::sleep;
 
 use super::*;
-use crate::plant::{testing::TestPlant, watched::Watched};
+use crate::plant::testing::TestPlant;
 use drived_config::{
     places::Places,
     rights::{Rights, Role, Scope},
@@ -99,7 +99,7 @@ async fn a_program_that_is_started_anew_has_the_alarms_with_their_notes_and_a_tr
     test.plant.act_on_alarm(&operator(), before.id, &acknowledge("mechanic comes")).unwrap();
     test.plant.close_alarms();
     keeping.await.unwrap();
-    let plant = Plant::start_with(test.plant.fleet(), Vec::new(), false, &kept(), Watched::default());
+    let plant = Plant::start_with(test.plant.fleet(), Vec::new(), false, &kept(), Default::default());
     sleep(Duration::from_secs(20)).await;
     let after = one(&plant).alarm;
     assert_eq!((after.id, after.count, after.first_unix_ms), (before.id, 1, before.first_unix_ms));
@@ -218,7 +218,7 @@ async fn a_stop_that_is_nobodys_is_an_alarm_through_restarts_until_its_drive_is_
     // The program is started anew: it is the same, and waits for somebody until he has taken note of it.
     let again = kept();
     let runs = again.runs.clone().unwrap();
-    let plant = Plant::start_with(test.plant.fleet(), Vec::new(), false, &again, Watched::default());
+    let plant = Plant::start_with(test.plant.fleet(), Vec::new(), false, &again, Default::default());
     sleep(Duration::from_secs(20)).await;
     let after = one(&plant);
     assert_eq!((after.alarm.id, after.alarm.count, after.state), (before.alarm.id, 1, before.state));
