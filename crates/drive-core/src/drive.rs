@@ -16,7 +16,7 @@ use crate::{
     kept_readings::KeptReadings,
     lease::{Ground, Lease, Recognised},
     refusal::{Refusal, SelfRestart},
-    registers::{Row, Written},
+    registers::{Place, Row, Written},
     setpoint::{Direction, Setpoint, StopMode},
     status::{Measurements, Status},
     stopped::Stopped,
@@ -343,6 +343,13 @@ pub trait Drive: Send {
     async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
         let _ = (register, word);
         Intent::kept()
+    }
+
+    /// By which stop the values stop the motor that another master would write at once, where no [word](Self::intent) of them tells that by
+    /// itself: to coils (1 is on), or to registers that are a stop together. What they hold besides is left out of it. `None`: by none.
+    fn stopped_by(&self, written: &[(Place, u16)]) -> Option<StopMode> {
+        let _ = written;
+        None
     }
 
     /// Reads the register of a row.

@@ -1065,3 +1065,41 @@ async fn the_word_of_a_stop_by_another_master_is_known_as_one_and_no_other_word_
         assert_eq!(intent.ok().flatten(), stop.map(Intent::Stop), "{key} {register:04X}h {word:04X}h");
     }
 }
+
+/// A WJ200 and an MX2 run by their coil RUN, beside which stands that of the direction; words may be a stop together.
+#[tokio::test]
+async fn a_stop_by_a_coil_or_by_several_registers_is_known_among_all_that_is_written_at_once_and_only_whole()
+{
+    use drive_core::registers::{Place, Space};
+    let ramp = Some(StopMode::Ramp);
+    for key in ["wj200", "mx2"] {
+        let drive = rig(key).drive;
+        let row = drive.capabilities().rows.iter().find(|row| row.code == "RUN").expect("it has one");
+        let run = row.place();
+        assert_eq!(run.space, Space::Coil);
+        let beside = Place { address: run.address + 1, ..run };
+        for (written, stop) in [
+            (&[(run, 0)][..], ramp),
+            (&[(run, 0), (beside, 1)], ramp),
+            (&[(run, 1), (beside, 0)], None),
+            (&[(beside, 0)], None),
+            // The register of that number.
+            (&[(Place::from(run.address), 0)], None),
+        ] {
+            assert_eq!(drive.stopped_by(written), stop, "{key} {written:?}");
+        }
+    }
+    let together = text("delta/ms300").replace("words = [0x0001] }], seen", "words = [1, 0] }], seen");
+    let of = family_of(read(&together).expect("it is right"));
+    let mut drive = contract(of, of.simulated_options()).rig().drive;
+    let [one, other, third] = [0x2000, 0x2001, 0x2002].map(Place::from);
+    for (written, stop) in [
+        (&[(one, 1), (other, 0)][..], ramp),
+        (&[(one, 1), (other, 0), (third, 7)], ramp),
+        (&[(one, 1)], None),
+        (&[(one, 1), (other, 1)], None),
+    ] {
+        assert_eq!(drive.stopped_by(written), stop, "{written:?}");
+    }
+    assert!(drive.intent(0x2000, 1).await.is_err(), "half of it is none");
+}

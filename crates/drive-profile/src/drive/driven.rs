@@ -5,10 +5,12 @@ use std::time::Duration;
 use drive_core::{
     Class, Command, Direction, Drive, Error, Faults, Ground, Identity, Intent, Lease, Measurements, Port,
     Recognised, Refusal, Result, Row, Setpoint, Status, StopMode, Stopped, Watchdog, WatchdogCapability,
-    Withdrawn, Written, async_trait, registers::refuse_commands,
+    Withdrawn, Written, async_trait,
+    registers::{Place, refuse_commands},
 };
 
 use super::ProfileDrive;
+use crate::written::Written as Value;
 
 #[async_trait]
 impl<P: Port> Drive for ProfileDrive<P> {
@@ -154,10 +156,15 @@ impl<P: Port> Drive for ProfileDrive<P> {
 
     /// Its stops alone, each by the one word that its profile writes for it: what other words do to the motor the profile does not say.
     async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
-        match self.profile.stopped_by(register, word) {
+        match self.stopped_by(&[(Place::from(register), word)]) {
             Some(mode) => Ok(Some(Intent::Stop(mode))),
             None => Intent::kept(),
         }
+    }
+
+    fn stopped_by(&self, written: &[(Place, u16)]) -> Option<StopMode> {
+        let one = |&(Place { space, address }, value): &(Place, u16)| Value { space, address, value };
+        self.profile.stopped_by(&written.iter().map(one).collect::<Vec<_>>())
     }
 
     async fn read_parameter(&mut self, row: &'static Row) -> Result<u16> {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use drive_core::{
     Capabilities, FaultEntry, Quantity, Row, SerialSettings, StopMode, interned,
-    registers::{Access, Choice, Confidence, Factory, Form, Place, Range, Space, Storage, Unit},
+    registers::{Access, Choice, Confidence, Factory, Form, Place, Range, Storage, Unit},
     serial::CharacterFormat,
 };
 
@@ -120,10 +120,12 @@ impl Profile {
         MODES.iter().filter_map(has).collect()
     }
 
-    /// The stop that is this word in this register, and nothing else.
-    pub(crate) fn stopped_by(&self, register: u16, word: u16) -> Option<StopMode> {
-        let written = [Written { space: Space::HoldingRegister, address: register, value: word }];
-        let is_it = |stop: &Action| self.file.writes(stop) == written;
+    /// The stop that is among these values, whole.
+    pub(crate) fn stopped_by(&self, written: &[Written]) -> Option<StopMode> {
+        let is_it = |stop: &Action| {
+            let writes = self.file.writes(stop);
+            !writes.is_empty() && writes.iter().all(|one| written.contains(one))
+        };
         let has = |(name, mode): &(ModeName, StopMode)| {
             self.file.stop.of(*name).given().filter(|stop| is_it(stop.get_ref())).map(|_| *mode)
         };

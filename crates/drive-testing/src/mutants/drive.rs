@@ -7,7 +7,7 @@ use drive_core::{
     BroadcastWrite, Capabilities, Direction, Drive, Error, Faults, Frequency, Ground, Identity, Intent,
     KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, Reaction, Recognised, Refusal, Result, Row,
     SelfRestart, Setpoint, SlaveAddress, Status, StopMode, Stopped, Verdict, Watchdog, WatchdogCapability,
-    Withdrawn, Written,
+    Withdrawn, Written, registers::Place,
 };
 
 use super::{Mutant, port::Tap};
@@ -233,6 +233,10 @@ impl Drive for Faulty {
 
     async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
         self.drive.intent(register, word).await
+    }
+
+    fn stopped_by(&self, written: &[(Place, u16)]) -> Option<StopMode> {
+        self.drive.stopped_by(written)
     }
 
     async fn read_parameter(&mut self, row: &'static Row) -> Result<u16> {

@@ -65,7 +65,8 @@ impl Desk {
             Intent::ResetFaults(_) if stands(&drive) || shows_fault(&drive) => None,
             intent => self.stops_by(&drive, intent),
         });
-        by_a_word.map(Stop)
+        let places: Vec<_> = ask.places().collect();
+        by_a_word.or_else(|| self.speaker(&drive)?.stopped_by(&places)).map(Stop)
     }
 
     /// How what a word asks stops a motor that runs, if it does. In a quick stop of the chart no word acts but one that disables the
@@ -160,7 +161,7 @@ impl Desk {
         ask: &Ask,
     ) -> impl Iterator<Item = Intent> + use<> {
         let mut speaker = self.speaker(drive);
-        let words: Vec<(u16, u16)> = ask.writes().collect();
+        let words: Vec<(u16, u16)> = ask.writes().filter(|_| !ask.is_of_coils()).collect();
         words.into_iter().filter_map(move |(register, word)| {
             speaker.as_mut()?.intent(register, word).now_or_never()?.ok().flatten()
         })
@@ -225,7 +226,7 @@ impl Desk {
         ask: &Ask,
         arrived: Instant,
     ) -> Result<(), Refusal> {
-        if ask.writes().count() == 1 {
+        if ask.is_of_coils() || ask.writes().count() == 1 {
             return Ok(());
         }
         let deadline = arrived + self.config.patience;
@@ -292,6 +293,9 @@ impl Desk {
     ) -> Result<(), Refusal> {
         if !self.config.rights.operate {
             return Err(Refusal::rule("this gateway only stops: writes = \"stop\""));
+        }
+        if ask.is_of_coils() {
+            return Err(Refusal::new(ExceptionCode::IllegalFunction, "of coils only a stop is carried out"));
         }
         let deadline = arrived + self.config.patience;
         let wanted = timeout_at(deadline, self.wanted(drive, ask)).await.map_err(|_| busy())??;

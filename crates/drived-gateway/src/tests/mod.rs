@@ -1,5 +1,6 @@
 //! Clients of a gateway before a simulated plant, in virtual time.
 
+mod by_file;
 mod reading;
 mod writing;
 

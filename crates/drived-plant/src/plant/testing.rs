@@ -10,7 +10,7 @@ use drive_core::{
     Control, Current, Direction, Error, Fault, FaultEntry, Faults, Identity, Lease, Motion, SelfRestart,
     SerialSettings, State, Status, StopMode,
 };
-use drive_families::{Family, SetUp, simulated};
+use drive_families::{Family, Options, SetUp, simulated};
 use drive_fleet::{
     Counters, DriveSettings, Fleet, IdentityCheck, Limit, Link, PendingStop, Snapshot, Timed, Trip,
     WatchdogCheck,
@@ -47,8 +47,27 @@ impl TestPlant {
         Self::start(drives, DriveSettings::controlled, kept).await
     }
 
+    /// Drives of another family than Altivar 312 that may be commanded.
+    pub async fn of_family(family: Family, drives: u8) -> Self {
+        let options = family.simulated_options();
+        let plant =
+            Self::start_of((family, &options), drives, DriveSettings::controlled, &KeptAlarms::default())
+                .await;
+        let names = plant.plant.fleet().drives().into_iter().map(|drive| drive.name().to_string());
+        plant.plant.set_options(names.map(|name| (name, options.clone())).collect());
+        plant
+    }
+
     async fn start(drives: u8, settings: impl Fn(String) -> DriveSettings, kept: &KeptAlarms) -> Self {
-        let family = Family::ATV312;
+        Self::start_of((Family::ATV312, &simulated::options()), drives, settings, kept).await
+    }
+
+    async fn start_of(
+        (family, options): (Family, &Options),
+        drives: u8,
+        settings: impl Fn(String) -> DriveSettings,
+        kept: &KeptAlarms,
+    ) -> Self {
         let line = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
         let config = LineConfig {
             response_timeout: Duration::from_millis(100),
@@ -64,7 +83,7 @@ impl TestPlant {
         let names: Vec<String> = (1..=drives).map(|slave| format!("pump {slave}")).collect();
         for (slave, name) in (1..).zip(&names) {
             builder = builder.drive("north", slave, settings(name.clone()), |port, slave| {
-                family.open_with(port, slave, &simulated::options())
+                family.open_with(port, slave, options)
             });
         }
         let fleet = builder.start().unwrap();
