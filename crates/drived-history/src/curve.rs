@@ -103,13 +103,28 @@ impl Step {
 pub struct Steps {
     length: i64,
     pub all: BTreeMap<i64, Step>,
+    /// For how long each count held, by the beginning of its step, where that is asked for.
+    held_ms: Option<BTreeMap<(i64, i64), i64>>,
 }
 
 impl Steps {
     /// None yet, of this many milliseconds each.
     #[must_use]
     pub fn of(length: i64) -> Self {
-        Self { length: length.max(1), all: BTreeMap::new() }
+        Self { length: length.max(1), all: BTreeMap::new(), held_ms: None }
+    }
+
+    /// The same of what is no number: they also tell for how long each count held, as far as it is [added](Self::add) in pieces.
+    #[must_use]
+    pub fn of_words(length: i64) -> Self {
+        Self { held_ms: Some(BTreeMap::new()), ..Self::of(length) }
+    }
+
+    /// Which counts held within the step that begins then, and for how many milliseconds each.
+    pub fn held(&self, start: i64) -> impl Iterator<Item = (i64, i64)> + '_ {
+        let range = (start, i64::MIN)..=(start, i64::MAX);
+        let held = self.held_ms.iter().flat_map(move |held| held.range(range.clone()));
+        held.map(|((_, count), lasts)| (*count, *lasts))
     }
 
     /// Adds what a piece knows.
@@ -160,6 +175,9 @@ impl Steps {
             let held =
                 Step { least: count, greatest: count, mean: count as f64, known_ms: (end - at).max(0) };
             self.add_step(start, held);
+            if let Some(all) = &mut self.held_ms {
+                *all.entry((start, count)).or_default() += held.known_ms;
+            }
             if end >= until {
                 return;
             }

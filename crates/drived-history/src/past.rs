@@ -183,15 +183,15 @@ impl Past for InFile {
                     let Ok(place) = usize::try_from((step.start_unix_ms - first) / every_ms) else {
                         continue;
                     };
-                    let set = |list: &mut Vec<Option<f64>>, value: f64| {
+                    let set = |list: &mut Vec<Option<f64>>, value: Option<f64>| {
                         if let Some(cell) = list.get_mut(place) {
                             // As many places as the thickness of a line can show.
-                            *cell = Some((value * 1_000.0).round() / 1_000.0);
+                            *cell = value.map(|value| (value * 1_000.0).round() / 1_000.0);
                         }
                     };
-                    set(&mut curve.least, step.least);
+                    set(&mut curve.least, Some(step.least));
                     set(&mut curve.mean, step.mean);
-                    set(&mut curve.greatest, step.greatest);
+                    set(&mut curve.greatest, Some(step.greatest));
                     if let Some(known) = curve.known.get_mut(place) {
                         *known = (step.known * 10_000.0).round() / 10_000.0;
                     }

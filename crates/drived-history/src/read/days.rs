@@ -218,7 +218,7 @@ fn energy(
     for power in [Quantity::INPUT_POWER, Quantity::OUTPUT_POWER] {
         let known = hours(power)?;
         if !known.is_empty() {
-            let amount = known.iter().map(|step| step.mean * step.known).sum();
+            let amount = known.iter().map(|step| step.mean.unwrap_or_default() * step.known).sum();
             return Ok(Some(EnergyView { amount, from: EnergyFrom::Summed }));
         }
     }

@@ -4,12 +4,11 @@ use drived_plant::plant::past::StepView;
 use rusqlite::{Connection, params};
 use serde::Deserialize;
 
-use super::{steps::told, told_in};
-use crate::{
-    curve::{Piece, Steps},
-    quantity::Quantity,
-    store::StoreError,
+use super::{
+    steps::{empty, told},
+    told_in,
 };
+use crate::{curve::Piece, quantity::Quantity, store::StoreError};
 
 /// A clock that was set back by more is not looked for: nobody asks by both readings of it.
 const LONGEST_MS: i64 = 24 * 3_600_000;
@@ -178,9 +177,9 @@ impl Reading {
         quantity: Quantity,
         length_ms: i64,
     ) -> Result<Vec<StepView>, StoreError> {
-        let mut steps = Steps::of(length_ms.max(1));
+        let mut steps = empty(quantity, length_ms.max(1));
         self.pieces(connection, drive, quantity)?.into_iter().for_each(|piece| steps.add(piece));
-        Ok(told(steps, quantity, length_ms.max(1)))
+        Ok(told(&steps, quantity, length_ms.max(1)))
     }
 }
 

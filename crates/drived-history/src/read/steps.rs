@@ -1,6 +1,6 @@
 //! What is known of a quantity in steps of equal length.
 
-use drived_plant::plant::past::StepView;
+use drived_plant::plant::past::{ShareView, StepView};
 use rusqlite::{Connection, params};
 
 use super::{chunks, kept, pieces, source, windows};
@@ -36,7 +36,7 @@ pub fn steps(
 ) -> Result<Vec<StepView>, StoreError> {
     let length_ms = length_ms.max(1);
     let from = from - from.rem_euclid(length_ms);
-    let mut steps = Steps::of(length_ms);
+    let mut steps = empty(quantity, length_ms);
     if length_ms % MINUTE_MS != 0 || !quantity.is_number() {
         let (first, last) = kept(connection, drive, quantity, from, to)?;
         for (start, end) in windows(first, last) {
@@ -90,19 +90,33 @@ pub fn steps(
             }
         }
     }
-    Ok(told(steps, quantity, length_ms))
+    Ok(told(&steps, quantity, length_ms))
+}
+
+/// No steps yet, of what is to be told of a quantity.
+pub(super) fn empty(quantity: Quantity, length_ms: i64) -> Steps {
+    let has_words = quantity.row().is_some_and(|row| !row.words.is_empty());
+    if has_words { Steps::of_words(length_ms) } else { Steps::of(length_ms) }
 }
 
 /// Steps in the unit of their quantity.
-pub(super) fn told(steps: Steps, quantity: Quantity, length_ms: i64) -> Vec<StepView> {
-    let told = |(start, step): (i64, Step)| StepView {
+pub(super) fn told(steps: &Steps, quantity: Quantity, length_ms: i64) -> Vec<StepView> {
+    let share = |ms: i64| (ms as f64 / length_ms as f64).min(1.0);
+    let shares = |start| {
+        steps
+            .held(start)
+            .map(|(count, ms)| ShareView { is: quantity.text(count), share: share(ms) })
+            .collect()
+    };
+    let told = |(&start, step): (&i64, &Step)| StepView {
         start_unix_ms: start,
         least: quantity.value(step.least as f64),
-        mean: quantity.value(step.mean),
+        mean: quantity.is_number().then(|| quantity.value(step.mean)),
         greatest: quantity.value(step.greatest as f64),
-        known: (step.known_ms as f64 / length_ms as f64).min(1.0),
+        known: share(step.known_ms),
+        shares: shares(start),
     };
-    steps.all.into_iter().map(told).collect()
+    steps.all.iter().map(told).collect()
 }
 
 /// The beginning of the hour from which on minutes of a quantity are kept.

@@ -51,5 +51,5 @@ fn mean_around(
     };
     let start = at - at.rem_euclid(length);
     let found = steps(connection, drive, quantity, start, start + length - 1, length, &|| true)?;
-    Ok(found.first().filter(|step| step.known > 0.5).map(|step| step.mean))
+    Ok(found.first().filter(|step| step.known > 0.5).and_then(|step| step.mean))
 }

@@ -110,6 +110,28 @@ fn curves_of_several_drives_have_one_grid_and_nothing_stands_where_nothing_is_kn
     assert!(state.mean.is_empty() && other.known.iter().all(|known| *known == 1.0));
 }
 
+/// A state is no number: half of "disabled" and "running" is no "ready".
+#[test]
+fn a_step_of_states_tells_for_how_much_of_it_each_was_and_no_mean() {
+    let folder = Folder::new("history-shares");
+    let (past, _store) = lived(&folder);
+    let steps = |value: &str, from: i64, every_ms: i64| {
+        let (from_unix_ms, drive, value) = (BEGIN_MS + from, "a".to_owned(), value.to_owned());
+        let to_unix_ms = from_unix_ms + every_ms - 1;
+        let asked = ValuesAsked { drive, value, from_unix_ms, to_unix_ms, every_ms: Some(every_ms) };
+        serde_json::to_value(past.values(&asked, &WAITING()).unwrap().steps).unwrap()
+    };
+    // It is ready for thirty minutes of the second hour, runs for twenty, and is not heard of for ten.
+    let told = steps("state", HOUR_MS, HOUR_MS);
+    let share = |of: usize| (told[0]["shares"][of]["share"].as_f64().unwrap() * 60.0).round();
+    assert_eq!((&told[0]["shares"][0]["is"], share(0)), (&"ready".into(), 30.0), "{told}");
+    assert_eq!((&told[0]["shares"][1]["is"], share(1)), (&"running".into(), 20.0), "{told}");
+    assert_eq!((told[0].get("mean"), told[0]["shares"].as_array().unwrap().len()), (None, 2), "{told}");
+    let told = steps("output_frequency_hz", 0, HOUR_MS);
+    let mean = told[0]["mean"].as_f64().unwrap();
+    assert!((mean - 15.0).abs() < 0.01 && told[0].get("shares").is_none(), "{told}");
+}
+
 #[test]
 fn what_is_too_much_is_refused_with_what_would_not_be_and_who_has_gone_is_not_answered() {
     let folder = Folder::new("history-bound");

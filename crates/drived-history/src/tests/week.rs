@@ -167,7 +167,8 @@ fn quarters_are_those_of_the_minutes(connection: &Connection, steady: i64) {
         let is_same = (one.start_unix_ms, one.least, one.greatest)
             == (other.start_unix_ms, other.least, other.greatest);
         // Each minute's mean is kept to a count.
-        let is_near = (one.mean - other.mean).abs() < 0.011 && (one.known - other.known).abs() < 0.000_1;
+        let is_near = (one.mean.unwrap() - other.mean.unwrap()).abs() < 0.011
+            && (one.known - other.known).abs() < 0.000_1;
         assert!(is_same && is_near, "{one:?} {other:?}");
     }
 }
@@ -205,7 +206,7 @@ fn steps_are_those_of_the_reference(connection: &Connection, reference: &Referen
             );
             if known > 0 {
                 let mean = sum / known as f64 / 100.0;
-                assert!((step.mean - mean).abs() <= within, "{step:?}: mean {mean}");
+                assert!((step.mean.unwrap() - mean).abs() <= within, "{step:?}: mean {mean}");
             }
             let near = |told: f64, count: i64| (told - count as f64 / 100.0).abs() <= within;
             assert!(

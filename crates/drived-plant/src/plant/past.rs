@@ -419,16 +419,30 @@ pub enum IsView {
 }
 
 /// One step, in the value's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StepView {
     /// When it begins.
     pub start_unix_ms: i64,
+    /// Of a word its place among the value's words.
     pub least: f64,
-    /// By time, over what is known.
-    pub mean: f64,
+    /// By time, over what is known. Of words and bits there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean: Option<f64>,
     pub greatest: f64,
     /// The share of the step for which something is known, from 0 to 1.
     pub known: f64,
+    /// Of a value in words: each that it was.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shares: Vec<ShareView>,
+}
+
+/// For how much of a step a value was this word.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ShareView {
+    /// `running`.
+    pub is: String,
+    /// From 0 to 1: those of a step are together what is known of it.
+    pub share: f64,
 }
 
 /// Which of what happened is asked for.

@@ -263,9 +263,10 @@ impl Asked<'_> {
                 })?,
                 Some(every) => {
                     for step in self.steps(quantity, length(every))? {
-                        let Told { start_unix_ms, least, mean, greatest, known } = step;
+                        let Told { start_unix_ms, least, mean, greatest, known, .. } = step;
+                        let mean = mean.map(|mean| format!("{mean:.3}")).unwrap_or_default();
                         output::say_as_it_is(format_args!(
-                            "{},{start_unix_ms},{quantity},{least},{mean:.3},{greatest},{known:.4}",
+                            "{},{start_unix_ms},{quantity},{least},{mean},{greatest},{known:.4}",
                             whole(start_unix_ms)
                         ))?;
                     }
@@ -309,9 +310,9 @@ impl Asked<'_> {
             let steps: Vec<plot::Step> = self
                 .steps(quantity, length)?
                 .into_iter()
-                .map(|told| {
+                .filter_map(|told| {
                     let Told { start_unix_ms, least, mean, greatest, .. } = told;
-                    plot::Step { place: (start_unix_ms - from) as f64, least, mean, greatest }
+                    Some(plot::Step { place: (start_unix_ms - from) as f64, least, mean: mean?, greatest })
                 })
                 .collect();
             if steps.is_empty() {
@@ -385,11 +386,11 @@ fn in_words(quantity: Quantity, told: Option<&Told>) -> String {
     let Some(told) = told else { return "-".to_owned() };
     let text = |value: f64| quantity.text((value * quantity.per() as f64).round() as i64);
     let (least, greatest) = (text(told.least), text(told.greatest));
-    match quantity.is_number() {
+    match told.mean {
         _ if least == greatest => least,
-        true => format!("{least} .. {} .. {greatest}", text(told.mean)),
-        // Which lay between them the words do not tell.
-        false => format!("{least}, {greatest}"),
+        Some(mean) => format!("{least} .. {} .. {greatest}", text(mean)),
+        None if told.shares.is_empty() => format!("{least}, {greatest}"),
+        None => told.shares.iter().map(|share| &*share.is).collect::<Vec<_>>().join(", "),
     }
 }
 
