@@ -22,6 +22,10 @@ impl Past for Asked {
         self.ask(InFile::about)
     }
 
+    fn knows(&self, drive: &str) -> Result<bool, PastError> {
+        self.ask(|past| past.knows(drive))
+    }
+
     fn values(&self, asked: &ValuesAsked, given_up: &GivenUp) -> Result<ValuesView, PastError> {
         self.ask(|past| past.values(asked, given_up))
     }

@@ -112,6 +112,10 @@ impl Past for InFile {
         })
     }
 
+    fn knows(&self, drive: &str) -> Result<bool, PastError> {
+        Ok(read::drives(&self.open()?.0)?.iter().any(|known| known == drive))
+    }
+
     fn values(&self, asked: &ValuesAsked, given_up: &GivenUp) -> Result<ValuesView, PastError> {
         let ValuesAsked { drive, value, from_unix_ms, to_unix_ms, every_ms } = asked;
         let quantity = named(value)?;

@@ -14,7 +14,7 @@ use super::{
     ask::{Named, Viewer},
     capture,
     problem::Problem,
-    read::fresh,
+    read::{fresh, no_drive},
 };
 use drived_plant::plant::{
     Plant,
@@ -73,8 +73,8 @@ pub(super) async fn values(
     if every_ms.is_some_and(|every| every < 1) {
         return Err(Problem::new(StatusCode::BAD_REQUEST, "every_ms: expected 1 or more"));
     }
-    let asked = ValuesAsked { drive, value, from_unix_ms, to_unix_ms, every_ms };
-    told(&plant, move |past, given_up| past.values(&asked, given_up)).await
+    let asked = ValuesAsked { drive: drive.clone(), value, from_unix_ms, to_unix_ms, every_ms };
+    told_of(&plant, drive, move |past, _, given_up| past.values(&asked, given_up)).await
 }
 
 /// What stands in a question in which a key may come more than once.
@@ -150,7 +150,7 @@ pub(super) async fn frames(
 ) -> Result<Response, Problem> {
     let Query(Between { from_unix_ms, to_unix_ms }) = query?;
     are_moments([from_unix_ms, to_unix_ms])?;
-    told(&plant, move |past, _| past.frames(&drive, from_unix_ms, to_unix_ms)).await
+    told_of(&plant, drive, move |past, drive, _| past.frames(drive, from_unix_ms, to_unix_ms)).await
 }
 
 pub(super) async fn capture_of_frame(
@@ -161,7 +161,7 @@ pub(super) async fn capture_of_frame(
 ) -> Result<Response, Problem> {
     let Query(At { at_unix_ms }) = query?;
     are_moments([at_unix_ms])?;
-    let ask = move |past: &dyn Past, _: &GivenUp| past.capture(&drive, at_unix_ms);
+    let ask = of(&plant, drive, move |past, drive, _| past.capture(drive, at_unix_ms));
     told_as(&plant, ask, |file| (capture::heads("trip.pcapng"), file).into_response()).await
 }
 
@@ -170,7 +170,7 @@ pub(super) async fn parameters(
     _: Viewer,
     Named(drive): Named,
 ) -> Result<Response, Problem> {
-    told(&plant, move |past, _| past.parameters(&drive)).await
+    told_of(&plant, drive, |past, drive, _| past.parameters(drive)).await
 }
 
 pub(super) async fn records(
@@ -205,7 +205,7 @@ pub(super) async fn why(
 ) -> Result<Response, Problem> {
     let Query(At { at_unix_ms }) = query?;
     are_moments([at_unix_ms])?;
-    told(&plant, move |past, _| past.story(&drive, at_unix_ms)).await
+    told_of(&plant, drive, move |past, drive, _| past.story(drive, at_unix_ms)).await
 }
 
 /// Refuses what is no moment of this calendar: behind it nobody has to think of what overflows. The bounds are those of ECMAScript.
@@ -223,6 +223,27 @@ async fn told<T: Serialize + 'static>(
     ask: impl FnOnce(&dyn Past, &GivenUp) -> Result<T, PastError> + Send + 'static,
 ) -> Result<Response, Problem> {
     told_as(plant, ask, |view| fresh(&view)).await
+}
+
+/// The same of a drive: one that is there, or one that was and of which something is kept.
+async fn told_of<T: Serialize + 'static>(
+    plant: &Plant,
+    drive: String,
+    ask: impl FnOnce(&dyn Past, &str, &GivenUp) -> Result<T, PastError> + Send + 'static,
+) -> Result<Response, Problem> {
+    told(plant, of(plant, drive, ask)).await
+}
+
+fn of<T, F: FnOnce(&dyn Past, &str, &GivenUp) -> Result<T, PastError>>(
+    plant: &Plant,
+    drive: String,
+    ask: F,
+) -> impl FnOnce(&dyn Past, &GivenUp) -> Result<T, PastError> + use<T, F> {
+    let is_there = plant.fleet().drive(&drive).is_some();
+    move |past, given_up| match is_there || past.knows(&drive)? {
+        true => ask(past, &drive, given_up),
+        false => Err(PastError::NoDrive(drive)),
+    }
 }
 
 /// The same in a form of its own.
@@ -244,6 +265,7 @@ async fn told_as<T: 'static>(
     });
     match answer.await.map_err(|error| unreadable(error.to_string()))? {
         Ok(answer) => Ok(answer),
+        Err(PastError::NoDrive(name)) => Err(no_drive(&name)),
         Err(error @ PastError::Asked(_)) => Err(Problem::new(StatusCode::BAD_REQUEST, error.to_string())),
         Err(error) => Err(unreadable(error.to_string())),
     }

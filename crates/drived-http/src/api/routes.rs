@@ -393,6 +393,7 @@ fn pasts() -> Vec<Route> {
         Route::get("/api/v1/drives/{name}/why", past::why, "What happened to a drive at a moment, in words")
             .with_query(at)
             .answers::<StoryView>(200, "what came first, what followed, who did what, and what is not known")
+            .or_problem(404)
             .or_problem(503),
         with_time(
             Route::get("/api/v1/history/records", past::records, "What happened between two moments")

@@ -27,6 +27,12 @@ pub trait Past: Send + Sync {
     /// [`PastError`]: nothing can be answered.
     fn about(&self) -> Result<KeptView, PastError>;
 
+    /// Whether there is anything of a drive, also of one that is not there any more.
+    ///
+    /// # Errors
+    /// [`PastError`]: nothing can be answered.
+    fn knows(&self, drive: &str) -> Result<bool, PastError>;
+
     /// The values of a drive.
     ///
     /// # Errors
@@ -129,6 +135,9 @@ pub enum PastError {
     /// What is asked cannot be.
     #[error("{0}")]
     Asked(String),
+    /// A drive that is not there, and of which nothing is kept.
+    #[error("there is no drive {0:?}")]
+    NoDrive(String),
     /// It cannot be read now.
     #[error("the history cannot be read: {0}")]
     Unreadable(String),

@@ -5,6 +5,7 @@ mod as_shown;
 mod commanding;
 mod described;
 mod doors;
+mod past;
 mod reading;
 mod streaming;
 
