@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::{Daemon, DaemonArgs};
 use drived_plant::plant::views::{CommandView, DriveView, HappenedView, LineView};
 use drived_screen::row;
-use drived_words::{failure::Failure, output};
+use drived_words::{failure::Failure, moment, output};
 
 /// Prints what happens until the daemon ends or nobody reads any more.
 pub async fn watch(args: &DaemonArgs, daemon: &mut Daemon) -> Result<(), Failure> {
@@ -24,7 +24,7 @@ pub async fn watch(args: &DaemonArgs, daemon: &mut Daemon) -> Result<(), Failure
             if args.is_json() {
                 output::say_as_it_is(serde_json::json!({ "kind": name, "data": data }))?;
             } else if let Some(text) = Heard::of(&name, data).and_then(|heard| text(&heard, &mut shown)) {
-                output::say(format_args!("{} {text}", chrono::Local::now().format("%H:%M:%S")))?;
+                output::say(format_args!("{} {text}", moment::told(&chrono::Local::now(), "%H:%M:%S")))?;
             }
         }
     }

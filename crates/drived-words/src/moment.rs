@@ -1,6 +1,8 @@
 //! Moments as a person says them: `03:12`, `yesterday 03:12`, `2026-11-21 03:12`, `2026-11-21T03:12:00+01:00`, `now`.
 
-use chrono::{DateTime, Days, LocalResult, NaiveDateTime, NaiveTime, TimeZone};
+use std::fmt::Display;
+
+use chrono::{DateTime, Days, Local, LocalResult, NaiveDateTime, NaiveTime, TimeZone};
 
 /// A moment that somebody has said.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,6 +51,19 @@ pub fn said<Tz: TimeZone>(text: &str, now: &DateTime<Tz>) -> Result<Said<Tz>, No
         (Some(at), again) => Ok(Said { at, again }),
         (None, _) => Err(NoMoment::LeftOut(local)),
     }
+}
+
+/// A moment as a person reads it, in this form. In the hour that comes twice its offset stands behind it: nothing else tells the two apart.
+pub fn told<Tz: TimeZone<Offset: Display>>(at: &DateTime<Tz>, form: &str) -> String {
+    match in_order(at.timezone().from_local_datetime(&at.naive_local())) {
+        (_, None) => at.format(form).to_string(),
+        _ => format!("{} {}", at.format(form), at.format("%:z")),
+    }
+}
+
+/// The same of milliseconds since 1970, in this machine's zone; `None`: they are no moment.
+pub fn told_here(unix_ms: i64, form: &str) -> Option<String> {
+    DateTime::from_timestamp_millis(unix_ms).map(|at| told(&at.with_timezone(&Local), form))
 }
 
 /// When a time of the clock was, and when it was again where it came twice. In which order a zone tells the two is its own.
@@ -185,6 +200,27 @@ mod tests {
         for both in [LocalResult::Ambiguous(summer, winter), LocalResult::Ambiguous(winter, summer)] {
             assert_eq!(in_order(both), (Some(summer), Some(winter)));
         }
+    }
+
+    #[test]
+    fn a_moment_of_the_hour_that_comes_twice_is_told_with_what_tells_the_two_apart() {
+        let at = |offset: i32, hour: u32, minute: u32| {
+            let local = hours(offset).from_local_datetime(&at(10, 25, hour, minute)).unwrap();
+            told(&local.with_timezone(&Paris), "%H:%M:%S")
+        };
+        let times = [at(2, 1, 59), at(2, 2, 0), at(2, 2, 59), at(1, 2, 0), at(1, 2, 59), at(1, 3, 0)];
+        let [twice, again] = ["+02:00", "+01:00"];
+        assert_eq!(
+            times,
+            [
+                "01:59:00".to_owned(),
+                format!("02:00:00 {twice}"),
+                format!("02:59:00 {twice}"),
+                format!("02:00:00 {again}"),
+                format!("02:59:00 {again}"),
+                "03:00:00".to_owned(),
+            ]
+        );
     }
 
     #[test]

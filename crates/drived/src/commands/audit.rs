@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, str::FromStr};
 
-use chrono::{DateTime, Local};
+use chrono::Local;
 use serde_json::json;
 
 use super::token::ConfigArgs;
@@ -117,9 +117,8 @@ fn show(records: &[Found]) -> Result<(), Failure> {
     let mut table = Table::new(["time", "caller", "from", "kind", "what", "outcome"]);
     for record in records {
         let Found { kind, caller, origin, what, .. } = record.clone();
-        let time = i64::try_from(record.time_unix_ms).ok().and_then(DateTime::from_timestamp_millis);
-        let time =
-            output::or_dash(time.map(|time| time.with_timezone(&Local).format("%Y-%m-%d %H:%M:%S%.3f")));
+        let time = i64::try_from(record.time_unix_ms).ok();
+        let time = output::or_dash(time.and_then(|time| moment::told_here(time, "%Y-%m-%d %H:%M:%S%.3f")));
         let body = record.body.as_ref().map(|body| format!(" {body}")).unwrap_or_default();
         let status = record.status.map(|status| status.to_string());
         table.row([

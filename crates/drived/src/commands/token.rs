@@ -17,6 +17,7 @@ use drived_doors::{
 use drived_file::Config;
 use drived_words::{
     failure::Failure,
+    moment,
     output::{self, JsonArgs, Table},
 };
 
@@ -292,8 +293,7 @@ fn list(tokens: &[TokenView], json: JsonArgs) -> Result<(), Failure> {
     let mut table = Table::new(["name", "role", "for", "made", "ends"]);
     for token in tokens {
         let time = |unix_s: u64| {
-            let time = chrono::DateTime::from_timestamp(i64::try_from(unix_s).ok()?, 0)?;
-            Some(time.with_timezone(&chrono::Local).format("%Y-%m-%d %H:%M").to_string())
+            moment::told_here(i64::try_from(unix_s).ok()?.checked_mul(1_000)?, "%Y-%m-%d %H:%M")
         };
         let made = output::or_dash(time(token.made_unix_s));
         let ends =

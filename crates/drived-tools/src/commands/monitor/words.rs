@@ -1,6 +1,7 @@
 //! What the API says in one word, in plain words: those of the page.
 
 use drived_plant::plant::commands::OutcomeWord;
+use drived_words::moment;
 
 /// What became of a command.
 pub(super) fn outcome(word: OutcomeWord) -> String {
@@ -15,6 +16,6 @@ pub(super) fn outcome(word: OutcomeWord) -> String {
 
 /// A moment on the wall's clock.
 pub(super) fn clock(unix_ms: u64) -> String {
-    let at = i64::try_from(unix_ms).ok().and_then(chrono::DateTime::from_timestamp_millis);
-    at.map_or_else(|| "-".to_owned(), |at| at.with_timezone(&chrono::Local).format("%H:%M:%S").to_string())
+    let told = i64::try_from(unix_ms).ok().and_then(|at| moment::told_here(at, "%H:%M:%S"));
+    told.unwrap_or_else(|| "-".to_owned())
 }

@@ -2,13 +2,12 @@
 
 use std::time::Duration;
 
-use chrono::{DateTime, Local};
 use drive_fleet::Counters;
 use maud::{Markup, Render, html};
 
 use super::gather::DriveTold;
 use drived_plant::plant::views::DriveView;
-use drived_words::output;
+use drived_words::{moment, output};
 
 /// A sentence of the program's own, which has other words in another language.
 pub(super) fn own(text: &str) -> Markup {
@@ -87,11 +86,8 @@ pub(super) fn percent(share: f64) -> String {
 /// A moment by this computer's clock.
 pub(super) fn moment(unix_ms: impl Into<Option<u64>>) -> String {
     let time = unix_ms.into().and_then(|time| i64::try_from(time).ok());
-    let time = time.and_then(DateTime::from_timestamp_millis);
-    time.map_or_else(
-        || "an unknown time".to_owned(),
-        |time| time.with_timezone(&Local).format("%Y-%m-%d %H:%M:%S").to_string(),
-    )
+    let told = time.and_then(|time| moment::told_here(time, "%Y-%m-%d %H:%M:%S"));
+    told.unwrap_or_else(|| "an unknown time".to_owned())
 }
 
 impl DriveTold {

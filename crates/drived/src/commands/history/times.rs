@@ -24,10 +24,9 @@ pub(crate) fn moment_of(text: &str) -> Result<i64, Failure> {
     Ok(said.at.timestamp_millis())
 }
 
-/// A moment as a person reads it, with the zone's offset.
+/// A moment as a person reads it.
 pub(crate) fn said(unix_ms: i64) -> String {
-    local(unix_ms)
-        .map_or_else(|| unix_ms.to_string(), |time| time.format("%Y-%m-%d %H:%M:%S%.3f").to_string())
+    moment::told_here(unix_ms, "%Y-%m-%d %H:%M:%S%.3f").unwrap_or_else(|| unix_ms.to_string())
 }
 
 /// The day of a moment.

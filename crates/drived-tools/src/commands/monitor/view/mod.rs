@@ -24,7 +24,7 @@ use super::{
     words,
 };
 use drived_screen::row::{fitted, height_of};
-use drived_words::output;
+use drived_words::{moment, output};
 
 /// What stands beside every stop.
 const NO_EMERGENCY_STOP: &str = "no emergency stop";
@@ -85,7 +85,7 @@ fn title_of(model: &Model, now: Instant, width: usize) -> Line<'static> {
         Connection::Gone { .. } => ("NOT CONNECTED", Color::Red),
     };
     let demo = if plant.is_demo { ", simulated" } else { "" };
-    let right = format!("{state} {}", chrono::Local::now().format("%H:%M:%S"));
+    let right = format!("{state} {}", moment::told(&chrono::Local::now(), "%H:%M:%S"));
     let room = width.saturating_sub(right.chars().count() + 3);
     let left = fitted(&format!("drived monitor: {drives}{trouble}{demo}"), room);
     // Without colours the bar is seen by its reversal.
