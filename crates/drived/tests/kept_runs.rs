@@ -459,3 +459,27 @@ fn a_stop_whose_drive_is_not_in_the_configuration_any_more_is_an_alarm_until_it_
     }
     let _ = daemon.interrupt();
 }
+
+/// Who is in the place of one that is gone is that one by another name, to whoever counts hours and starts as to everybody else.
+#[test]
+fn a_motor_that_is_called_otherwise_while_no_daemon_runs_keeps_its_starts() {
+    let plant = Plant::new("kept-called");
+    let text = fs::read_to_string(plant.file.path()).expect("it is there");
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"identified""#);
+    run(&["start", "pump", "--setpoint", "20Hz", "--socket", &plant.socket]).assert_done();
+    assert_eq!(daemon.interrupt().0, Some(0));
+    let due = "[history]\nmaintenance = [{ drive = \"mill\", part = \"belt\", starts = 1 }]\n";
+    let renamed =
+        text.replace("[lines.bench]", &format!("{due}[lines.bench]")).replace("\"pump\"", "\"mill\"");
+    fs::write(plant.file.path(), renamed).expect("it can be written");
+    let mut daemon = plant.daemon();
+    let alarms = || run(&["alarms", "list", "--json", "--socket", &plant.socket]).out;
+    while !alarms().contains("maintenance is due: belt, after 1 starts") {
+        assert!(!daemon.has_ended());
+    }
+    assert_eq!(daemon.interrupt().0, Some(0));
+    let history = plant.state.join("history.sqlite");
+    let told = run(&["history", "mill", "--for", "1h", "--file", history.to_str().expect("it is text")]);
+    assert_eq!(told.out.matches("renamed: it was called pump").count(), 1, "{told:?}");
+}

@@ -72,6 +72,8 @@ pub struct Table {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Told {
     pub changed: Vec<String>,
+    /// The drives that are called otherwise: what each was called, and is called now.
+    pub renamed: Vec<(String, String)>,
     /// What the configuration gives and nobody may have.
     pub refused: Vec<String>,
 }
@@ -83,7 +85,7 @@ impl Table {
     pub fn take_up(&mut self, there: &Configured) -> Told {
         let mut told = Told::default();
         let is_first = self.drives.is_empty();
-        recognise("", &mut self.drives, &there.drives, &mut told);
+        told.renamed = recognise("", &mut self.drives, &there.drives, &mut told);
         recognise("line ", &mut self.lines, &there.lines, &mut told);
         recognise("group ", &mut self.groups, &there.groups, &mut told);
         self.give_as_configured(&there.drives, &mut told);
@@ -228,10 +230,10 @@ impl Known {
     }
 }
 
-/// Finds those of one kind among the known ones, and takes in who is new.
-fn recognise(kind: &str, all: &mut Vec<Known>, there: &[Named], told: &mut Told) {
+/// Finds those of one kind among the known ones, and takes in who is new. Gives who is called otherwise: what each was called, and is called now.
+fn recognise(kind: &str, all: &mut Vec<Known>, there: &[Named], told: &mut Told) -> Vec<(String, String)> {
     let is_there = |name: &str| there.iter().any(|named| named.name == name);
-    let mut new = Vec::new();
+    let (mut new, mut renamed) = (Vec::new(), Vec::new());
     for Named { name, place, .. } in there {
         if let Some(known) = all.iter_mut().find(|known| known.name == *name) {
             known.place.clone_from(place);
@@ -243,7 +245,7 @@ fn recognise(kind: &str, all: &mut Vec<Known>, there: &[Named], told: &mut Told)
                 known.name,
                 known.kept()
             ));
-            known.name.clone_from(name);
+            renamed.push((std::mem::replace(&mut known.name, name.clone()), name.clone()));
         } else {
             new.push((name, place));
         }
@@ -276,6 +278,7 @@ fn recognise(kind: &str, all: &mut Vec<Known>, there: &[Named], told: &mut Told)
         let (name, place) = ((*name).clone(), (*place).clone());
         all.push(Known { name, id, place, slot: None, topic, gone: false });
     }
+    renamed
 }
 
 /// A name as a level of a topic, and as an id of Home Assistant: letters, digits, `-` and `_`.

@@ -50,8 +50,9 @@ fn a_drive_that_is_taken_out_takes_its_number_along_and_has_it_again_when_it_com
 fn a_drive_that_is_called_otherwise_keeps_its_number_and_one_in_the_place_of_another_does_not_get_it() {
     let mut table = Table::default();
     table.take_up(&named(&[("fan 3", "a 3"), ("blower", "a 4")]));
-    let told = table.take_up(&named(&[("extractor", "a 3"), ("blower", "a 4")])).changed;
-    assert_eq!(told, ["fan 3 is called extractor now: it keeps its number 0"]);
+    let told = table.take_up(&named(&[("extractor", "a 3"), ("blower", "a 4")]));
+    assert_eq!(told.changed, ["fan 3 is called extractor now: it keeps its number 0"]);
+    assert_eq!(told.renamed, [("fan 3".to_owned(), "extractor".to_owned())]);
     assert_eq!(names_of(&table), held(&["extractor", "blower"]));
     let told = table.take_up(&named(&[("blower", "a 4"), ("pump", "a 9")])).changed;
     assert_eq!(told, ["extractor is gone: its number 0 is kept for it", "pump has the number 2"]);

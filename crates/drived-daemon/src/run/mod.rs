@@ -146,11 +146,12 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let findings = tokio::spawn(findings::follow(fleet.clone()));
     // Before anything is kept by which a later start sees that there was this one.
     let names = Names::in_folder(config.doors.state.folder.as_deref());
-    tell_names(&names, &config.lines, &config.groups);
+    let renamed = tell_names(&names, &config.lines, &config.groups);
     let alarms = KeptAlarms::in_folder(folder, &places).with_runs_of(kept.runs.clone());
     let watched = (watched, QuickStops::in_folder(folder, &places));
     let plant = Plant::start_with(fleet.clone(), config.groups.clone(), false, &alarms, watched);
     plant.set_names(names.clone());
+    renamed.iter().for_each(|(old, new)| plant.tell_renamed(old, new));
     let watched = plant.keep_watched();
     let alarms = plant.keep_alarms(alarms);
     plant.set_options(options(&config.lines));
@@ -284,10 +285,13 @@ async fn tell_beginning(file: PathBuf, link: Option<impl Future<Output = Option<
     }
 }
 
-/// Gives what there is its numbers and topics, and says in the log what has changed.
-fn tell_names(names: &Names, lines: &[LinePart], groups: &[Group]) {
+/// Gives what there is its numbers and topics, and says in the log what has changed. Gives the drives that are called otherwise than when they
+/// were there last.
+fn tell_names(names: &Names, lines: &[LinePart], groups: &[Group]) -> Vec<(String, String)> {
+    let mut called_otherwise = Vec::new();
     match names.take_up(&names::configured(lines, groups)) {
-        Ok(Told { changed, refused }) => {
+        Ok(Told { changed, renamed, refused }) => {
+            called_otherwise = renamed;
             if !changed.is_empty() {
                 tracing::info!("numbers of drives: {}", changed.join("; "));
             }

@@ -164,14 +164,17 @@ impl Reloader {
         plant.set_groups(config.groups.clone());
         let names_problem = plant.names_problem();
         // Who comes has his identity when he is there.
-        super::tell_names(&self.0.names, &new.lines, &config.groups);
+        let renamed = super::tell_names(&self.0.names, &new.lines, &config.groups);
         // Nobody asks for a drive that is not there yet.
         plant.set_options(super::options(&new.lines));
         let made = match self.may_begin() {
             Ok(()) => add_all(plant, &changes, &new, &lines, &mut leavings, &self.0.kept),
             Err(_) => Err(FleetError::ShutDown),
         };
-        let made = made.map(|()| settle(plant, config, &mut new, &changes));
+        let made = made.map(|()| {
+            tell_renamed(plant, &changes, &renamed);
+            settle(plant, config, &mut new, &changes)
+        });
         *self.0.leavings.lock().unwrap_or_else(PoisonError::into_inner) = leavings;
         // Also where nothing has changed: what is kept may have been mended.
         super::tell_names(&self.0.names, &config.lines, &config.groups);
@@ -468,6 +471,16 @@ fn add_all(
         // The file was planned as a whole.
         builder.whatever_the_plan()
     })
+}
+
+/// Tells who is called otherwise and was not there meanwhile: of those who went on the fleet tells.
+fn tell_renamed(plant: &Plant, changes: &[Change], renamed: &[(String, String)]) {
+    let went_on = |name: &str| {
+        let mut renamed = changes.iter().filter_map(Change::renamed);
+        renamed.any(|(_, settings)| settings.name == name)
+    };
+    let others = renamed.iter().filter(|(_, new)| !went_on(new));
+    others.for_each(|(old, new)| plant.tell_renamed(old, new));
 }
 
 /// Gives the drives their new settings, and makes the lines of `config` those that there are now. What holds from the next

@@ -342,6 +342,16 @@ impl Plant {
         }
     }
 
+    /// Tells that a drive which was never here by another name had one before it came: while no program ran, or before a reload took it out.
+    pub fn tell_renamed(&self, old: &str, new: &str) {
+        let text = drive_fleet::EventKind::Renamed(Arc::from(old)).to_string();
+        let time_unix_ms = unix(Instant::now());
+        let event = serde_json::json!({
+            "time_unix_ms": time_unix_ms, "drive": new, "event": "renamed", "was": old, "alarm": false, "text": text,
+        });
+        self.0.revisions.push(revisions::Subject::Event, &event);
+    }
+
     /// The last ten minutes of a drive.
     pub fn history(&self, name: &str, since_unix_ms: Option<u64>) -> Option<HistoryView> {
         self.0.fleet.drive(name).map(|_| self.0.history.of(name, since_unix_ms))

@@ -11,6 +11,7 @@ use super::*;
 use drived_config::{config::State, names::Names, places::Places};
 use drived_doors::{Caller, Rights, audit::Audit};
 use drived_face::Surroundings;
+use drived_plant::plant::revisions::Next;
 
 #[path = "../../../../drived-http/src/api/testing.rs"]
 mod described;
@@ -130,6 +131,40 @@ async fn a_reload_that_waits_for_a_silent_drive_says_in_time_for_which_and_goes_
     machine.unmute();
     tokio::time::sleep(Duration::from_secs(25)).await;
     assert!(fleet.drive("pump").is_none() && !machine.observe().running, "{:?}", machine.observe());
+}
+
+/// It goes by the names that are kept, and not by what the fleet remembers: that has forgotten who was taken out.
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_comes_back_by_another_name_is_told_as_the_one_that_it_was() {
+    let folder = drived_config::testing::Folder::new("back");
+    let file = folder.file("drives.toml");
+    let [both, one, back] = [
+        text(&[("south", 1, "other"), ("north", 2, "beside"), ("north", 1, "pump")]),
+        text(&[("south", 1, "other"), ("north", 2, "beside")]),
+        text(&[("south", 1, "another"), ("north", 2, "beside"), ("north", 1, "mill")]),
+    ];
+    fs::write(&file, &both).unwrap();
+    let (_fleet, reloader) = begun(&file);
+    let (mut reader, _) = reloader.0.plant.revisions().keeper();
+    for text in [both, one, back] {
+        fs::write(&file, text).unwrap();
+        reloader.reload(false).await.unwrap();
+    }
+    let (revisions, mut told) = (reloader.0.plant.revisions(), Vec::new());
+    let until = tokio::time::Instant::now() + Duration::from_secs(5);
+    while let Ok(Next::Frames(frames)) = tokio::time::timeout_at(until, revisions.next(&mut reader)).await {
+        let frames = frames.iter().map(|frame| String::from_utf8_lossy(frame).into_owned());
+        let data = |frame: String| Some(frame.split_once("\ndata: ")?.1.to_owned());
+        let events =
+            frames.filter_map(data).filter_map(|data| serde_json::from_str::<serde_json::Value>(&data).ok());
+        let renamed = events.filter(|event| event["event"] == "renamed");
+        told.extend(renamed.map(|event| format!("{}: {}", event["drive"], event["text"])));
+    }
+    told.sort();
+    // That of the one that went on is told by the fleet, once.
+    let expected =
+        [r#""another": "renamed: it was called other""#, r#""mill": "renamed: it was called pump""#];
+    assert_eq!(told, expected);
 }
 
 /// The drives that were added, `two` of them by a guess and under control.
