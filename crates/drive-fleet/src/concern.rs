@@ -212,6 +212,18 @@ impl fmt::Display for Concern {
 }
 
 impl Concern {
+    /// Whether its detail is the error by which the drive was asked in vain last.
+    pub(crate) const fn is_by_error(&self) -> bool {
+        matches!(
+            self.kind,
+            ConcernKind::LostRunning
+                | ConcernKind::Lost
+                | ConcernKind::Refuses
+                | ConcernKind::Stale
+                | ConcernKind::NeverSeen
+        )
+    }
+
     /// For how long.
     #[must_use]
     pub fn lasts(&self, now: Instant) -> Option<Duration> {

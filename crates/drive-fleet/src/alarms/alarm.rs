@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::table::AlarmKind;
+use super::{look::Because, table::AlarmKind};
 
 /// Where an alarm is in its life, in the words of ISA-18.2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -126,6 +126,9 @@ pub struct Alarm {
     /// Since when it would have returned, if all that follows from it had.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub(super) ending_unix_ms: Option<u64>,
+    /// By what its detail was told.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub(super) because: Option<Because>,
     #[cfg_attr(feature = "serde", serde(skip))]
     pub(super) is_over: bool,
 }

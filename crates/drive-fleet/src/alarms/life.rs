@@ -4,7 +4,7 @@ use super::{
     Alarms, GONE_AFTER, LONGEST_NOTE, LONGEST_SHELF, RETURNED,
     alarm::{Alarm, AlarmChange, Became},
     fold,
-    look::{Condition, Look, milliseconds},
+    look::{Because, Condition, Look, milliseconds},
 };
 
 impl Alarms {
@@ -92,6 +92,7 @@ impl Alarms {
                 shelved: None,
                 suppressed_by: None,
                 ending_unix_ms: None,
+                because: condition.because.clone(),
                 is_over: false,
             };
             changes.push(told(Became::Came, &alarm));
@@ -101,8 +102,17 @@ impl Alarms {
         alarm.line.clone_from(&look.line);
         alarm.ending_unix_ms = None;
         let is_new = !alarm.is_active();
-        let is_explained = alarm.detail != detail || alarm.remedy != remedy;
-        (alarm.detail, alarm.remedy) = (detail, remedy);
+        let is_as_told = match &condition.because {
+            None => false,
+            Some(Because::NotAsked) => alarm.detail.is_some(),
+            because => *because == alarm.because,
+        };
+        let stands = !is_new && is_as_told;
+        let is_explained = !stands && alarm.detail != detail || alarm.remedy != remedy;
+        alarm.remedy = remedy;
+        if !stands {
+            (alarm.detail, alarm.because) = (detail, condition.because.clone());
+        }
         // Somebody has taken note of the fault that was there, or put that aside, and of no other.
         let before = !alarm.faults.is_empty();
         let is_another = before && condition.faults.iter().any(|code| !alarm.faults.contains(code));

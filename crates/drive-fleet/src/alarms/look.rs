@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, time::Duration};
 
 use drive_bus::evidence::{Defect, Finding};
+use drive_core::{Error, PortError};
 use tokio::time::Instant;
 
 use super::table::AlarmKind;
@@ -49,6 +50,40 @@ pub struct Condition {
     pub remedy: Option<String>,
     /// The codes of the faults that it is of; none: they are not known.
     pub faults: Vec<u16>,
+    /// By what it is so, where its detail says that in other words each time.
+    pub because: Option<Because>,
+}
+
+/// By what a drive does not answer. One alarm is told in one text for as long as this is the same: each question to a drive that is lost ends in
+/// another error, and the next one is another number of seconds away.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Because {
+    /// Nobody has asked it: that tells nothing of the drive, and nothing else of what was told.
+    NotAsked,
+    /// It was asked, and says nothing.
+    Silent,
+    /// Another one, in words.
+    Other(String),
+}
+
+impl Because {
+    /// That of an error, and the error in words that last.
+    fn of(error: &Error) -> (Self, String) {
+        let text = error.to_string();
+        let Error::Port { slave, exchange, problem } = error else {
+            return (Self::Other(text.clone()), text);
+        };
+        match problem {
+            PortError::Offline { .. } => {
+                (Self::Silent, format!("slave {slave}, {exchange}: the slave is off-line"))
+            }
+            PortError::Timeout { .. } => (Self::Silent, text),
+            PortError::Expired | PortError::Superseded | PortError::QueueFull(_) => (Self::NotAsked, text),
+            PortError::NeverQuiet { .. } => (Self::Other("the line is never quiet".to_owned()), text),
+            _ => (Self::Other(text.clone()), text),
+        }
+    }
 }
 
 /// What is seen of something.
@@ -82,16 +117,20 @@ impl Look {
             let AlarmKind::Drive(concern) = kind else { return None };
             let found = snapshot.concern_of(concern, now.at)?;
             let lasts = found.lasts(now.at).unwrap_or_default();
+            let by = snapshot.error.as_ref().filter(|_| found.is_by_error()).map(Because::of);
+            let (because, detail) =
+                by.map_or((None, found.detail), |(because, text)| (Some(because), Some(text)));
             (lasts >= kind.lasts_at_least()).then(|| Condition {
                 kind,
                 mark: None,
                 since_unix_ms: found.since.map(|since| now.of(since)),
-                detail: found.detail,
+                detail,
                 remedy: None,
                 faults: match concern {
                     ConcernKind::Tripped => snapshot.present_faults(),
                     _ => Vec::new(),
                 },
+                because,
             })
         };
         let seen = |kind: &AlarmKind| match kind {
@@ -174,7 +213,7 @@ impl Look {
 }
 
 fn condition(kind: AlarmKind, mark: Option<String>, detail: Option<String>) -> Condition {
-    Condition { kind, mark, since_unix_ms: None, detail, remedy: None, faults: Vec::new() }
+    Condition { kind, mark, since_unix_ms: None, detail, remedy: None, faults: Vec::new(), because: None }
 }
 
 fn alarms_of_drives() -> impl Iterator<Item = AlarmKind> {

@@ -34,7 +34,7 @@ use std::{collections::BTreeMap, time::Duration};
 pub use self::view::AlarmView;
 pub use self::{
     alarm::{Acknowledged, Alarm, AlarmChange, AlarmState, Became, Shelved},
-    look::{Condition, LineSeen, Look, Moment},
+    look::{Because, Condition, LineSeen, Look, Moment},
     table::AlarmKind,
 };
 

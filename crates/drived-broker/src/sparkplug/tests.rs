@@ -132,6 +132,22 @@ async fn a_drive_that_does_not_answer_any_more_dies_and_is_born_again_when_it_do
     assert_eq!(bench.metrics("pump 1")["Status/State"].quality, Some(Quality::Good));
 }
 
+/// When its line asks it next is no news of a drive that says nothing.
+#[tokio::test(start_paused = true)]
+async fn an_alarm_of_a_drive_that_does_not_answer_is_told_in_one_text_however_often_it_is_asked() {
+    let bench = Bench::of(2, config("one-text")).await;
+    bench.plant.machines[0].mute();
+    sleep(Duration::from_secs(300)).await;
+    let metrics = || bench.said(0).into_iter().filter(|(topic, _)| topic.starts_with('N'));
+    let metrics = || metrics().flat_map(|(_, payload)| payload.metrics);
+    for name in ["Drives/pump 1/Alarms/Text", "Drives/pump 1/Alarms/All"] {
+        let alias = metrics().find(|metric| metric.name.as_deref() == Some(name)).unwrap().alias;
+        let told = metrics().filter(|metric| metric.alias == alias && metric.name.is_none());
+        let told: Vec<_> = told.filter_map(|metric| metric.value).collect();
+        assert_eq!(told.len(), 1, "{name}: {told:#?}");
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_command_is_told_under_its_id_from_pending_to_confirmed() {
     let bench = Bench::of(1, config("command")).await;

@@ -75,7 +75,6 @@ pub(super) fn said(frame: &str, now: Moment, alarms: &mut Alarms) -> Option<Reco
         }
         "alarm" => {
             let told: ToldAlarm = serde_json::from_str(data).ok()?;
-            let told = ToldAlarm { text: lasting(told.text), ..told };
             if !alarms.is_new(&told) {
                 return None;
             }
@@ -174,23 +173,6 @@ mod tests {
     }
 
     #[test]
-    fn an_alarm_whose_line_will_ask_its_drive_at_another_time_is_no_other_alarm() {
-        let now = Moment { steady_ms: 0, wall_ms: 0 };
-        let mut alarms = Alarms::default();
-        let mut told = |time: &str| {
-            let text = format!(
-                "lost while it was running, the motor may turn: the slave is off-line, next probe in {time}"
-            );
-            let data = serde_json::json!({ "id": 7, "count": 1, "state": "unacknowledged", "drive": "pump", "text": text });
-            said(&format!("id: 1\nevent: alarm\ndata: {data}\n\n"), now, &mut alarms)
-                .map(|record| record.text)
-        };
-        let text = "lost while it was running, the motor may turn: the slave is off-line";
-        assert_eq!(told("539.8ms").as_deref(), Some(text));
-        assert_eq!(told("1.2s"), None);
-    }
-
-    #[test]
     fn a_loss_is_kept_once_by_each_of_its_words_however_often_these_come_again() {
         let now = Moment { steady_ms: 0, wall_ms: 0 };
         let mut alarms = Alarms::default();
@@ -200,12 +182,7 @@ mod tests {
                 serde_json::json!({ "id": 7, "count": count, "state": state, "drive": "pump", "text": text });
             said(&format!("id: 1\nevent: alarm\ndata: {data}\n\n"), now, &mut alarms).is_some()
         };
-        let whys = [
-            "no answer within 100 ms",
-            "expired before it was sent",
-            "the slave is off-line, next probe in 4.1 s",
-            "the slave is off-line, it is probed as soon as the line is free",
-        ];
+        let whys = ["no answer within 100 ms", "expired before it was sent", "the slave is off-line"];
         let mut all = |state: &str, count: u32| {
             let round = whys.iter().cycle().take(12);
             round.filter(|why| told(state, count, why)).count()

@@ -24,6 +24,7 @@ fn look(drive: Option<&str>, line: Option<&str>, there: &[AlarmKind]) -> Look {
         detail: None,
         remedy: None,
         faults: Vec::new(),
+        because: None,
     };
     Look {
         drive: drive.map(str::to_owned),

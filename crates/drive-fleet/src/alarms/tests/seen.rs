@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use drive_core::{Error, Motion, State, Status};
+use drive_core::{Error, Exchange, Motion, PortError, SlaveAddress, State, Status};
 use tokio::time::Instant;
 
 use super::*;
@@ -77,6 +77,32 @@ fn a_motor_that_was_stopping_when_it_was_lost_may_turn_until_it_is_seen_again() 
         alarms.look(&[Look::at_drive("north", &back, moment(now))], 24 * HOUR);
         assert_eq!(states(&alarms), [(LOST_RUNNING, AlarmState::Returned)], "{state}");
     }
+}
+
+/// Which question ends in which error, and when the next one is due, is of the line: nothing of it is news of the drive.
+#[test]
+fn a_loss_is_one_text_for_as_long_as_its_cause_is_the_same() {
+    let (now, mut alarms) = (Instant::now(), Alarms::default());
+    let silent = |milliseconds| PortError::Timeout { after: Duration::from_millis(milliseconds) };
+    let off_line = |milliseconds| PortError::Offline { retry_in: Duration::from_millis(milliseconds) };
+    let mut told = |problem: PortError| {
+        let mut drive = lost(showing(State::Running, Motion::Driven, now));
+        let exchange = Exchange { function: 3, register: Some(3201) };
+        drive.error = Some(Error::Port { slave: SlaveAddress::try_from(7).unwrap(), exchange, problem });
+        let changes = alarms.look(&[Look::at_drive("north", &drive, moment(now))], 10);
+        changes.into_iter().map(|change| change.alarm.detail.unwrap()).collect::<Vec<_>>()
+    };
+    let head = "slave 7, reading register 3201 (0C81h): ";
+    assert_eq!(told(PortError::Expired), [format!("{head}expired before it was sent")]);
+    assert_eq!(told(silent(100)), [format!("{head}no answer within 100 ms")], "that is more than was known");
+    for problem in [off_line(4_100), off_line(3_100), off_line(0), PortError::Expired, silent(112)] {
+        assert_eq!(told(problem.clone()), [""; 0], "{problem}");
+    }
+    let damaged = PortError::Damaged("CRC");
+    assert_eq!(told(damaged.clone()), [format!("{head}the answer was damaged (CRC)")]);
+    assert_eq!(told(damaged), [""; 0]);
+    assert_eq!(told(off_line(2_000)), [format!("{head}the slave is off-line")]);
+    assert_eq!(told(off_line(1_900)), [""; 0]);
 }
 
 #[test]
