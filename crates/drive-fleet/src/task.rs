@@ -421,11 +421,12 @@ impl Desk {
 
     /// Tells what there is to tell: the snapshot first, so that who hears an outcome sees what it rests on.
     fn publish(&mut self) {
+        // One for all that is told now: who reads of a trip finds the change of the state that was read with it by its time, and no alarm that
+        // comes of the snapshot is older than what happened.
+        let moment = Moment::now();
         if let Some(snapshot) = self.supervisor.take_snapshot(Instant::now()) {
             self.snapshots.send_replace(Arc::new(snapshot));
         }
-        // One for all that is told now: who reads of a trip finds the change of the state that was read with it by its time.
-        let moment = Moment::now();
         while let Some(output) = self.supervisor.poll_output() {
             match output {
                 Output::Event(happened) => {

@@ -20,10 +20,10 @@ use serde::Serialize;
 use tokio::{
     sync::watch,
     task::{AbortHandle, JoinSet},
-    time::{Instant, MissedTickBehavior, interval, sleep},
+    time::{Instant, MissedTickBehavior, interval, sleep, timeout},
 };
 
-use self::said::{Alarms, said};
+use self::said::{Alarms, is_of_an_alarm, said};
 use crate::{
     captured::{self, Wanted},
     clocks::{Clocks, milliseconds},
@@ -51,6 +51,8 @@ const PULSE: Duration = Duration::from_millis(500);
 const STOOD_STILL: Duration = Duration::from_secs(2);
 /// An alarm of the program is looked for once in a second.
 const SEEN_WITHIN: Duration = Duration::from_secs(3);
+/// An alarm and what it comes of are told by two tasks, and hardly further from each other than this.
+const TOGETHER: Duration = Duration::from_millis(20);
 /// So many of the last exchanges of its line are kept beside a trip.
 const EXCHANGES: usize = 40;
 
@@ -176,11 +178,23 @@ async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks, wanted: Wanted) {
     let (mut alarms, mut reasons) = (Alarms::default(), Reasons::default());
     loop {
         let next = plant.revisions().next(&mut reader).await;
+        let now = clocks.now();
         match next {
-            Next::Frames(frames) => {
+            Next::Frames(mut frames) => {
+                let mut is_gone = false;
+                if frames.iter().any(|frame| is_of_an_alarm(frame)) {
+                    // What it comes of is told by another task.
+                    sleep(TOGETHER).await;
+                    match timeout(Duration::ZERO, plant.revisions().next(&mut reader)).await {
+                        Ok(Next::Frames(more)) => frames.extend(more),
+                        Ok(Next::Reset(_)) => is_gone = true,
+                        Ok(Next::End) | Err(_) => {}
+                    }
+                }
+                let mut records = Vec::new();
                 for frame in frames {
                     let frame = std::str::from_utf8(&frame).ok();
-                    let told = frame.and_then(|frame| said(frame, clocks.now(), &mut alarms));
+                    let told = frame.and_then(|frame| said(frame, now, &mut alarms));
                     let Some(mut record) = told else { continue };
                     reasons.look(&mut record);
                     // Whoever asks what else happened on a line finds it by that.
@@ -195,18 +209,29 @@ async fn stream(plant: Plant, inbox: Inbox, clocks: Clocks, wanted: Wanted) {
                     let kept = drive.filter(|_| record.what == "trip_explained").and_then(|drive| {
                         own_record(&drive.snapshot(), Record { body: None, ..record.clone() })
                     });
-                    inbox.record(record);
-                    if let Some(kept) = kept {
-                        inbox.record(kept);
-                    }
+                    put(&mut records, record);
+                    records.extend(kept);
+                }
+                records.into_iter().for_each(|record| inbox.record(record));
+                if is_gone {
+                    inbox.record(told_anew(now));
                 }
             }
             // Too much at once: whether something is missing nobody knows.
-            Next::Reset(_) => inbox.record(told_anew(clocks.now())),
+            Next::Reset(_) => inbox.record(told_anew(now)),
             Next::End => return,
         }
         plant.revisions().is_kept(&reader);
     }
+}
+
+/// Puts a record to those that are told with it: an event before the alarms that may have come of it.
+fn put(records: &mut Vec<Record>, record: Record) {
+    let comes_of_it = |other: &&Record| {
+        record.kind == Kind::Event && other.kind == Kind::Alarm && other.at.wall_ms >= record.at.wall_ms
+    };
+    let behind = records.iter().rev().take_while(comes_of_it).count();
+    records.insert(records.len() - behind, record);
 }
 
 fn told_anew(now: Moment) -> Record {
@@ -355,7 +380,7 @@ async fn tell(plant: Plant, mut health: watch::Receiver<Health>) {
 mod tests {
     use drive_fleet::alarms::{AlarmKind, AlarmState};
     use drived_config::rights::{Caller, Rights};
-    use drived_plant::plant::testing::TestPlant;
+    use drived_plant::plant::{revisions::Subject, testing::TestPlant};
 
     use super::*;
 
@@ -405,6 +430,30 @@ mod tests {
         assert_eq!((&*told.what, told.kind), ("stood_still", Kind::History));
         let since = format!("{{\"since_unix_ms\":{}}}", told.at.wall_ms - 15_000);
         assert_eq!(told.body, Some(since));
+    }
+
+    /// The tasks that tell alarms and events wait for nobody, so that an alarm may be told first.
+    #[tokio::test(start_paused = true)]
+    async fn an_alarm_stands_behind_what_it_comes_of_whichever_is_told_first() {
+        let test = TestPlant::of(1).await;
+        let inbox = Inbox::default();
+        let (_health, seen) = watch::channel(Health::Writing);
+        let clocks = Clocks::begin();
+        let _listening = Listening::start(&test.plant, &inbox, clocks, seen);
+        tokio::time::sleep(Duration::from_millis(100)).await;
+        let _before = inbox.take(Duration::ZERO);
+        let tell = |subject, told| _ = test.plant.revisions().push(subject, &told);
+        let wall_ms = clocks.now().wall_ms;
+        let event = |what: &str, time_unix_ms: i64| serde_json::json!({ "time_unix_ms": time_unix_ms, "drive": "pump 1", "event": what, "alarm": false, "text": what });
+        let alarm = serde_json::json!({ "id": 7, "count": 1, "state": "unacknowledged", "drive": "pump 1", "text": "tripped" });
+        tell(Subject::Alarm, alarm);
+        tokio::time::sleep(Duration::from_millis(3)).await;
+        tell(Subject::Event, event("tripped", wall_ms - 5));
+        tell(Subject::Event, event("later", wall_ms + 60_000));
+        tokio::time::sleep(Duration::from_millis(100)).await;
+        let records = inbox.take(Duration::ZERO).records;
+        let told: Vec<&str> = records.iter().map(|record| &*record.what).collect();
+        assert_eq!(told, ["tripped", "unacknowledged", "later"]);
     }
 
     #[tokio::test(start_paused = true)]

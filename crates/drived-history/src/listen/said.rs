@@ -57,6 +57,11 @@ impl Alarms {
     }
 }
 
+/// Whether a frame of the event stream tells of an alarm.
+pub(super) fn is_of_an_alarm(frame: &[u8]) -> bool {
+    frame.split(|byte| *byte == b'\n').nth(1) == Some(b"event: alarm")
+}
+
 /// What a frame of the event stream says, as a record; `None`: it is of a drive's or a line's values.
 pub(super) fn said(frame: &str, now: Moment, alarms: &mut Alarms) -> Option<Record> {
     let (head, data) = frame.split_once("\ndata: ")?;
