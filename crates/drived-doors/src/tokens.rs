@@ -4,7 +4,7 @@ use std::{
     fmt,
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
-    time::{Duration, SystemTime},
+    time::{Duration, Instant, SystemTime},
 };
 
 use drived_config::{
@@ -36,9 +36,33 @@ pub fn new_secret() -> Result<String, TokenError> {
     Ok(format!("{PREFIX}{}", digits(&bits)))
 }
 
-/// Now, in seconds since 1970.
+/// The wall's clock.
+fn wall() -> Duration {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default()
+}
+
+/// Now, in seconds since 1970: whatever the wall's clock is set back to, this program has seen the latest time that it told, and what has
+/// passed since.
 fn now() -> u64 {
-    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs()
+    static SEEN: Mutex<Option<Seen>> = Mutex::new(None);
+    let mut seen = SEEN.lock().unwrap_or_else(PoisonError::into_inner);
+    let latest = Seen::behind(*seen, Instant::now(), wall());
+    *seen = Some(latest);
+    latest.wall.as_secs()
+}
+
+/// The latest time that was told, and when by a clock that is never set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Seen {
+    at: Instant,
+    wall: Duration,
+}
+
+impl Seen {
+    fn behind(before: Option<Self>, at: Instant, wall: Duration) -> Self {
+        let passed = before.map(|before| before.wall + at.saturating_duration_since(before.at));
+        Self { at, wall: wall.max(passed.unwrap_or_default()) }
+    }
 }
 
 /// One token.
@@ -152,6 +176,8 @@ impl Tokens {
     pub fn open(file: &Path) -> Result<Self, TokenError> {
         let tokens = Self { kept: Kept::at(file), read: Mutex::new(None) };
         tokens.all()?;
+        // From here on no time is told again.
+        now();
         Ok(tokens)
     }
 
@@ -204,18 +230,19 @@ impl Tokens {
 
     /// The token with this hash.
     pub(super) fn of_hash(&self, wanted: &str) -> Result<Option<Token>, TokenError> {
-        Ok(of_hash(self.all()?, wanted))
+        Ok(of_hash(self.all()?, wanted, now()))
     }
 
-    /// The same for a stop: while the file cannot be looked at, as where the program has no descriptor left, of those that were read last.
+    /// The same for a stop: while the file cannot be looked at, as where the program has no descriptor left, of those that were read last. A
+    /// wall's clock that was ahead for a moment takes nobody's stop away for longer than that.
     pub(super) fn of_hash_for_stop(&self, wanted: &str) -> Result<Option<Token>, TokenError> {
         let all = self.all();
         if let Err(TokenError::File { what: "read", .. }) = all
             && let Some((_, known)) = &*self.read.lock().unwrap_or_else(PoisonError::into_inner)
         {
-            return Ok(of_hash(known.clone(), wanted));
+            return Ok(of_hash(known.clone(), wanted, wall().as_secs()));
         }
-        Ok(of_hash(all?, wanted))
+        Ok(of_hash(all?, wanted, wall().as_secs()))
     }
 
     /// Adds a token, for so long or for ever, and gives its secret, which nobody can ever read again.
@@ -318,8 +345,7 @@ impl Tokens {
 }
 
 /// Each is compared, whichever it is.
-fn of_hash(tokens: Vec<Token>, wanted: &str) -> Option<Token> {
-    let now = now();
+fn of_hash(tokens: Vec<Token>, wanted: &str, now: u64) -> Option<Token> {
     tokens.into_iter().fold(None, |found, token| if token.is(wanted, now) { Some(token) } else { found })
 }
 
@@ -390,6 +416,19 @@ mod tests {
         assert!(token.is(&first, token.made + 58) && !token.is(&first, token.made + 62));
         assert!(token.is(&second, token.made + 3_599) && !token.is(&second, token.made + 3_600));
         assert!(matches!(tokens.rotate("gone", hour), Err(TokenError::Unknown { .. })));
+    }
+
+    #[test]
+    fn a_time_that_was_told_is_not_told_again_by_a_clock_that_is_set_back() {
+        let (begun, seconds) = (Instant::now(), Duration::from_secs);
+        let look =
+            |seen: Option<Seen>, after, wall| Seen::behind(seen, begun + seconds(after), seconds(wall));
+        let first = look(None, 0, 10_000);
+        // It ran on unseen for an hour, and was set back by two then.
+        let back = look(Some(first), 3_600, 10_000 - 3_600);
+        assert_eq!(back.wall, seconds(13_600));
+        assert_eq!(look(Some(back), 3_601, 20_000).wall, seconds(20_000), "ahead is ahead");
+        assert_eq!(look(Some(back), 3_610, 0).wall, seconds(13_610));
     }
 
     #[test]
