@@ -29,6 +29,11 @@ pub trait Record: Serialize + DeserializeOwned + Clone + PartialEq {
         false
     }
 
+    /// Whether it stays at its place as well where it goes by the name to another one: that may be another machine.
+    fn stays_behind(&self) -> bool {
+        false
+    }
+
     /// What is so where the configuration has nobody at its place, in words.
     fn alone(&self) -> &'static str;
 }
@@ -38,6 +43,11 @@ impl Record for RunRecord {
 
     fn stops(&self) -> bool {
         self.stop.is_some()
+    }
+
+    /// A stop is given where its name is, and told. A run is adopted there, or it stands where it was and nobody watches it.
+    fn stays_behind(&self) -> bool {
+        self.stop.is_none()
     }
 
     fn alone(&self) -> &'static str {
@@ -128,13 +138,17 @@ impl<T: Record> Records<T> {
             let at = place.as_ref().map_or("a place that was not kept".to_owned(), Place::to_string);
             let now = places.now(&name, place.as_ref(), record.stops());
             if let Some(now) = now.filter(|now| !drives.contains_key(*now)) {
-                if place.is_some() {
+                if let Some(place) = place {
                     let text = format!(
                         "{told}: {name} was at {at}, where nobody is any more, and what was kept of it goes to {name} at {now}. If these are \
                          two drives: {} at {at}",
                         record.alone()
                     );
                     tell(&record, &text);
+                    if record.stays_behind() {
+                        let (name, record) = (Some(name.clone()), record.clone());
+                        drives.insert(place, Entry { name, record, is_alone: true });
+                    }
                 }
                 is_other = true;
                 drives.insert(now.clone(), Entry::of(&name, record));
@@ -204,6 +218,25 @@ impl<T: Record> Records<T> {
         inner.drives.retain(|_, entry| entry.is_alone);
         let all = all.into_iter().map(|(place, drive, record)| (place, Entry::of(&drive, record)));
         inner.drives.extend(all);
+    }
+
+    /// The drive at a place has shown that this record is its own: none of its name is left elsewhere, at another port. Gives whether the file
+    /// is to be written for it.
+    pub fn settle(&self, place: &Place, drive: &str) -> bool {
+        self.take_out(|other, entry| entry.name.as_deref() == Some(drive) && other.drive() == place.drive())
+    }
+
+    /// Somebody has seen to what is left at a place of a drive that is not in the configuration. Gives whether the file is to be written for it.
+    pub fn forget(&self, place: &Place) -> bool {
+        self.take_out(|other, _| other == place)
+    }
+
+    /// Takes out what is nobody's, of these.
+    fn take_out(&self, is_meant: impl Fn(&Place, &Entry<T>) -> bool) -> bool {
+        let drives = &mut self.lock().drives;
+        let before = drives.len();
+        drives.retain(|place, entry| !entry.is_alone || !is_meant(place, entry));
+        drives.len() < before
     }
 
     /// The drive at a place is called so now. Gives whether the file is to be written for it.

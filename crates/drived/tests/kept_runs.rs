@@ -483,3 +483,55 @@ fn a_motor_that_is_called_otherwise_while_no_daemon_runs_keeps_its_starts() {
     let told = run(&["history", "mill", "--for", "1h", "--file", history.to_str().expect("it is text")]);
     assert_eq!(told.out.matches("renamed: it was called pump").count(), 1, "{told:?}");
 }
+
+/// The same name at another port: a path that is another now has the same drive, and another machine may have the name.
+#[test]
+fn a_run_whose_name_is_at_another_machine_now_is_an_alarm_of_the_first_one_until_somebody_has_seen_to_it() {
+    let plant = Plant::new("kept-elsewhere");
+    let text = fs::read_to_string(plant.file.path()).expect("it is there");
+    let at = |link: &str| {
+        let port = |link: &str| format!("port = \"{link},");
+        let moved = text.replace(&port(plant.sim.link()), &port(link));
+        fs::write(plant.file.path(), moved).expect("it can be written");
+    };
+    let old_place = format!("pump ({}", plant.sim.link());
+    plant.run_and_kill();
+    // It is the same machine by another path, which it says itself: nothing is left of it.
+    let path = path("kept-elsewhere-path");
+    let _ = fs::remove_file(&path);
+    std::os::unix::fs::symlink(plant.sim.link(), &path).expect("it can be linked");
+    at(path.to_str().expect("it is text"));
+    let mut daemon = plant.daemon();
+    daemon.wait_for(r#""event":"run_adopted""#);
+    while plant.kept().contains(&format!("\"{} ", plant.sim.link())) {
+        assert!(!daemon.has_ended());
+    }
+    daemon.signal("-KILL");
+    assert_eq!(daemon.end().0, None);
+    // It is another one: that it does not run by us says nothing of the first.
+    let other = Sim::serve("kept-elsewhere-other", &["atv312@1"]);
+    at(other.link());
+    let mut daemon = plant.daemon();
+    let old_place = old_place.replace(plant.sim.link(), path.to_str().expect("it is text"));
+    let left = || {
+        let told = run(&["alarms", "list", "--json", "--socket", &plant.socket]);
+        let told: serde_json::Value = serde_json::from_str(&told.out).unwrap_or_default();
+        let all = told["alarms"].as_array()?.clone();
+        all.into_iter().find(|alarm| alarm["kind"] == "run_left" && alarm["state"] == "unacknowledged")
+    };
+    let alarm = loop {
+        match left() {
+            Some(alarm) => break alarm,
+            None => assert!(!daemon.has_ended()),
+        }
+    };
+    assert!(alarm["text"].as_str().is_some_and(|text| text.contains(&old_place)), "{alarm}");
+    daemon.wait_for(r#""event":"identified""#);
+    let number = alarm["id"].to_string();
+    run(&["alarms", "done", &number, "--note", "it stands", "--socket", &plant.socket]).assert_done();
+    while left().is_some() || plant.kept().trim() != "{}" {
+        assert!(!daemon.has_ended());
+    }
+    assert_eq!(daemon.interrupt().0, Some(0));
+    let _ = fs::remove_file(&path);
+}

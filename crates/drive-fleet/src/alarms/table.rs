@@ -99,7 +99,7 @@ impl AlarmKind {
                 "run_left",
                 "a run command of this program may stand in a drive that is not in the configuration, and nobody watches it: the motor may turn",
                 Severity::Alarm,
-                "see whether the motor turns; once its drive is in the configuration again, it is watched and can be stopped from here",
+                "see whether the motor turns; once its drive is in the configuration again, it is watched and can be stopped from here; where it is not to be there again: drived alarms done NUMBER",
             ),
             Self::AuditLog => row(
                 "audit_log",

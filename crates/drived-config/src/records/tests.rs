@@ -113,3 +113,38 @@ fn what_belongs_to_nobody_is_kept_until_the_place_is_there_again() {
     let after = open(&[("east", "/dev/ttyUSB0 atv312@4")]);
     assert_eq!((after.of(&"/dev/ttyUSB0 atv312@4".into()), after.of(&THREE.into())), (None, Some(run)));
 }
+
+/// A port whose path is another now has the same drives, and another machine on another port is none of them: until the drive says which it is, the
+/// motor at the old place may turn.
+#[test]
+fn a_run_that_goes_by_the_name_to_another_port_stays_where_it_was_until_it_is_adopted_or_seen_to() {
+    let folder = Folder::new("records-behind");
+    let file = folder.file("runs.json");
+    let open = |drives: &[(&str, &str)]| Records::<RunRecord>::open(Some(&file), &places(drives));
+    let (run, elsewhere) = (record(None), "/dev/ttyUSB7 atv312@1");
+    // By the next start a file has had it.
+    let again = || Records::open(Some(&file), &places(&[("north", elsewhere)]).after([elsewhere.into()]));
+    let moved = || {
+        let before = open(&[("north", ONE)]);
+        before.set(&ONE.into(), "north", Some(run.clone()));
+        before.write();
+        let after = open(&[("north", elsewhere)]);
+        assert_eq!(after.of(&elsewhere.into()), Some(run.clone()));
+        assert_eq!(after.left(), BTreeMap::from([(ONE.into(), (format!("north ({ONE})"), run.clone()))]));
+        after
+    };
+    // It is another one: what it has ends, and what is left is.
+    let after = moved();
+    after.set(&elsewhere.into(), "north", None);
+    after.write();
+    let after: Records<RunRecord> = again();
+    assert_eq!((after.of(&elsewhere.into()), after.left().len()), (None, 1));
+    assert!(after.forget(&ONE.into()) && !after.forget(&ONE.into()), "somebody has seen to it");
+    // It is the same one.
+    let after = moved();
+    assert!(after.settle(&elsewhere.into(), "north") && !after.settle(&elsewhere.into(), "north"));
+    after.write();
+    let after: Records<RunRecord> = again();
+    assert_eq!((after.of(&elsewhere.into()), after.left().len()), (Some(run.clone()), 0));
+    assert!(!after.forget(&elsewhere.into()), "it is somebody's");
+}

@@ -67,9 +67,9 @@ use drived_words::{
     signals::{Ending, Wish, Wishes},
 };
 
-/// So many follow what happens from the start on: what is told on stdout, the log, the records of watchdogs and of EEPROMs, the plant with its
-/// history, who is driven by a profile, and the audit log.
-const READERS: usize = 7;
+/// So many follow what happens from the start on: what is told on stdout, the log, the records of watchdogs, of EEPROMs and of runs, the plant
+/// with its history, who is driven by a profile, and the audit log.
+const READERS: usize = 8;
 /// How long the disk has for the last records of the audit log.
 const AUDITED_WITHIN: Duration = Duration::from_secs(2);
 /// So soon a page has its address, unless somebody else has it.
@@ -143,6 +143,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let journal = tokio::spawn(journal::keep(fleet.clone(), fleet.events(), journal::log));
     let watchdogs = records::follow(kept.watchdogs.clone(), fleet.events(), watchdogs::note);
     let eeproms = records::follow(kept.eeproms.clone(), fleet.events(), eeprom::note);
+    let adopted = records::follow(kept.runs.clone(), fleet.events(), runs::note);
     let findings = tokio::spawn(findings::follow(fleet.clone()));
     // Before anything is kept by which a later start sees that there was this one.
     let names = Names::in_folder(config.doors.state.folder.as_deref());
@@ -242,6 +243,7 @@ pub async fn run(args: Args) -> Result<(), Failure> {
     let _ = journal.await;
     let _ = watchdogs.await;
     let _ = eeproms.await;
+    let _ = adopted.await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, runs).await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, alarms).await;
     let _ = tokio::time::timeout(AUDITED_WITHIN, by_profile).await;
@@ -307,6 +309,7 @@ fn tell_names(names: &Names, lines: &[LinePart], groups: &[Group]) -> Vec<(Strin
             "{places} numbers are given, and a virtual unit has {PLACES} places: drived names forget frees those of drives that are gone"
         );
     }
+    called_otherwise
 }
 
 /// Shows the drives and the lines as a table, and the log below it.

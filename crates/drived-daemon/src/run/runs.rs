@@ -1,7 +1,7 @@
 //! The run commands of this program, kept before they are given: one that is killed stops nothing, and the next is to know again
 //! which motors it has started.
 
-use drive_fleet::{RunKept, RunRecord};
+use drive_fleet::{Event, EventKind, RunKept, RunRecord};
 use tokio::{
     sync::mpsc::UnboundedReceiver,
     task::{JoinHandle, spawn_blocking},
@@ -35,4 +35,9 @@ pub(super) fn follow(runs: Records<RunRecord>, mut told: UnboundedReceiver<RunKe
             all.drain(..).for_each(RunKept::kept);
         }
     })
+}
+
+/// A run that is adopted is nowhere else. Gives whether the file is another for it.
+pub(super) fn note(runs: &Records<RunRecord>, event: &Event) -> bool {
+    matches!(event.kind, EventKind::RunAdopted(_)) && runs.settle(&event.place, &event.drive)
 }

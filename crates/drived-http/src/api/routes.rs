@@ -601,7 +601,7 @@ fn commands() -> Vec<Route> {
         Route::of_alarm::<_, _, Done>(
             "/api/v1/alarms/{id}/done",
             alarms::done,
-            "Says that what an alarm of maintenance asks for was done: it is counted from now on",
+            "Says that what an alarm of maintenance, or of what a run has left, asks for was done",
         ),
         Route::stop::<_, _, Stop>("/api/v1/stop", command::stop_all, "Stops every drive"),
     ]

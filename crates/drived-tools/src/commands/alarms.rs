@@ -49,7 +49,8 @@ pub enum Command {
         #[command(flatten)]
         daemon: DaemonArgs,
     },
-    /// Say that the maintenance that an alarm asks for was done: hours and starts are counted from now on
+    /// Say that what an alarm asks for was done: maintenance, whose hours and starts are counted from now on, or that a motor which an earlier
+    /// run may have left turning was seen to stand
     Done {
         /// Its number
         #[arg(value_name = "NUMBER")]

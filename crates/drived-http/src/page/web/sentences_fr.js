@@ -51,7 +51,7 @@ export const SENTENCES_FR = {
   'look at the motors, then at the cable of the line and at the supply of its drives': 'regarder les moteurs, puis le câble de la ligne et l’alimentation de ses variateurs',
   'have it done, and say so: drived alarms done NUMBER': 'faites-le faire, et dites-le : drived alarms done NUMÉRO',
   'drived doctor says more': 'drived doctor en dit davantage',
-  'see whether the motor turns; once its drive is in the configuration again, it is watched and can be stopped from here': 'voir si le moteur tourne ; dès que son variateur est de nouveau dans la configuration, il est surveillé et peut être arrêté d’ici',
+  'see whether the motor turns; once its drive is in the configuration again, it is watched and can be stopped from here; where it is not to be there again: drived alarms done NUMBER': 'voir si le moteur tourne ; dès que son variateur est de nouveau dans la configuration, il est surveillé et peut être arrêté d’ici ; s’il ne doit plus y être : drived alarms done NUMÉRO',
   'see whether the motor turns; once its drive is in the configuration again, the stop is given anew': 'voir si le moteur tourne ; dès que son variateur est de nouveau dans la configuration, l’arrêt est redonné',
   'see whether its disk is full; the log of the program says why': 'voir si son disque est plein ; le journal du programme dit pourquoi',
   'see what is said of it, mend the file, and read it again': 'voir ce qui en est dit, corriger le fichier et le relire',

@@ -21,7 +21,7 @@ use drive_fleet::{
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tokio::{sync::watch, time::Instant};
+use tokio::{sync::watch, task::spawn_blocking, time::Instant};
 
 pub use self::{
     keep::KeptAlarms,
@@ -64,7 +64,8 @@ pub enum AlarmAct {
     Shelve { time: Duration, why: String },
     /// It is put aside no more.
     Unshelve,
-    /// What an alarm of maintenance asks for was done: from now on it is counted anew.
+    /// What an alarm asks for was done: maintenance, which is counted anew from now on, or somebody has seen that a motor of which a run or a stop
+    /// is left does not turn by it.
     Done { note: Option<String> },
 }
 
@@ -77,7 +78,7 @@ pub enum AlarmRejected {
     OutOfScope { caller: String, of: String },
     #[error("it has come again since it was seen")]
     CameAgain,
-    #[error("only maintenance is done, and this is none")]
+    #[error("only maintenance, and what a run has left, is seen to by saying so, and this is neither")]
     NoMaintenance,
     #[error("no history is kept by this program, in which it would be kept")]
     NotKept,
@@ -123,6 +124,13 @@ impl Desk {
     fn left(&self) -> BTreeMap<Place, (String, RunRecord)> {
         self.runs.as_ref().map(Records::left).unwrap_or_default()
     }
+
+    /// Somebody has seen to what is left at a place.
+    fn forget_left(&self, place: &Place) {
+        if let Some(runs) = self.runs.clone().filter(|runs| runs.forget(place)) {
+            spawn_blocking(move || runs.write());
+        }
+    }
 }
 
 impl Plant {
@@ -160,6 +168,12 @@ impl Plant {
             }
             AlarmAct::Shelve { time, why } => alarms.shelve(id, &caller.name, why, *time, now)?,
             AlarmAct::Unshelve => alarms.unshelve(id)?,
+            AlarmAct::Done { note } if matches!(alarm.kind, AlarmKind::RunLeft | AlarmKind::StopLeft) => {
+                let place = alarm.mark.as_deref().map(Place::from);
+                let changes = alarms.acknowledge(id, &caller.name, note.as_deref(), now)?;
+                place.iter().for_each(|place| self.0.alarms.forget_left(place));
+                changes
+            }
             AlarmAct::Done { note } => {
                 let (Some(drive), Some(part)) = (&alarm.drive, &alarm.mark) else {
                     return Err(AlarmRejected::NoMaintenance);

@@ -70,7 +70,7 @@ enum Written {
 }
 
 impl AlarmsSaid {
-    /// An object with its `action`: `acknowledge`, `shelve`, `unshelve` or, of maintenance, `done`.
+    /// An object with its `action`: `acknowledge`, `shelve`, `unshelve` or, of maintenance and of what a run has left, `done`.
     pub fn of(text: &str) -> Self {
         let object = match object(text.as_bytes()) {
             Ok(object) => object,

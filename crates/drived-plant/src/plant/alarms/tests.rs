@@ -189,6 +189,12 @@ async fn a_run_command_that_is_nobodys_is_an_alarm_of_a_motor_that_may_turn() {
     assert_eq!((alarm.alarm.kind.word(), alarm.state), ("run_left", AlarmState::Unacknowledged));
     assert!(alarm.alarm.kind.wakes(), "somebody is called for it");
     assert!(alarm.text.contains("the motor may turn") && alarm.text.contains("mixer"), "{alarm:?}");
+    // Where it is not to be there again nothing but a person can tell.
+    let seen_to = AlarmAct::Done { note: Some("it stands, I saw it".to_owned()) };
+    let noted = test.plant.act_on_alarm(&operator(), alarm.alarm.id, &seen_to).unwrap();
+    assert_eq!(noted.state, AlarmState::Acknowledged);
+    sleep(Duration::from_secs(3)).await;
+    assert_eq!(test.plant.alarms().alarms, []);
 }
 
 #[tokio::test(start_paused = true)]
