@@ -193,7 +193,12 @@ impl<P: Port> Atv21<P> {
             let directed = status.direction == Some(direction) || is_falling(first, status.output_frequency);
             if because.is_none() && runs && directed {
                 let verdict = self.verdict(&status);
-                return Ok(Status { verdict, ..status });
+                let mut reference = status.reference;
+                if let Some(told) = &mut reference {
+                    // Whether UL bounds FE02 no manual says; it bounds the output.
+                    *told = self.upper_limit().await.map_or(*told, |high| high.min(*told));
+                }
+                return Ok(Status { verdict, reference, ..status });
             }
             first = first.or(status.output_frequency);
             let over = because.is_some() && (status.is_fault() || Instant::now() >= settled);

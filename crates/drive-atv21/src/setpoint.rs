@@ -81,7 +81,7 @@ impl<P: Port> Atv21<P> {
     }
 
     /// The drive's UL, read once. A drive that has no such register judges the setpoint by itself.
-    async fn upper_limit(&mut self) -> Result<Frequency> {
+    pub(crate) async fn upper_limit(&mut self) -> Result<Frequency> {
         if let Some(limit) = self.upper_limit {
             return Ok(limit);
         }

@@ -147,6 +147,7 @@ impl<P: Port> Drivecom for Atv28<P> {
         // The last thing that is read: a stop of somebody else that came before shows in it.
         let held = self.read_control().await?;
         *status = self.status_of(&words);
+        status.reference = status.reference.map(|reference| self.proof.turns_at(reference));
         status.raw.push(raw_command(held));
         let direction = ControlWord::from_bits_retain(word).direction();
         let shown = words.state_words().shows_run(direction, words.reference(), words.output());

@@ -183,3 +183,11 @@ async fn a_motor_that_turns_the_other_way_and_says_nothing_of_a_ramp_is_not_told
     assert!(!told.contains(&Some(Verdict::InForce)), "{told:?}");
     assert!(matches!(told[5], Some(Verdict::NotInForce { lacks: Lack::Reference, .. })), "{told:?}");
 }
+
+/// The reference before the ramp is above the high speed, up to which the drive turns its motor.
+#[tokio::test(start_paused = true)]
+async fn a_start_at_a_reference_that_stands_above_the_high_speed_is_told_at_that() {
+    let mut drive = drive(&[&STANDS, &RUNS, &[(401, 600), (450, 600), (451, 500), (251, 50)]]);
+    let started = drive.start(Direction::Forward).await.unwrap();
+    assert_eq!(started.reference, Some(Frequency::from_hertz(50)));
+}

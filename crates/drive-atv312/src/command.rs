@@ -262,6 +262,7 @@ impl<P: Port> Drivecom for Atv312<P> {
         }
         let fault_code = status.fault_code;
         *status = Status { fault_code, ..self.status_of(&words) };
+        status.reference = status.reference.map(|reference| self.proof.turns_at(reference));
         status.raw.push(raw_command(controls.command));
         if controls.command != self.as_written(word) {
             return Ok(RunShown::NotYet);

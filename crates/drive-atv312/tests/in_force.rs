@@ -493,3 +493,12 @@ async fn a_motor_thermal_alarm_is_told_once_from_whichever_word_shows_it() {
         assert_eq!(told, ["motor thermal overload alarm"], "ETI {eti:04X}h, LRS1 {lrs1:04X}h");
     }
 }
+
+/// The reference before the ramp is above the high speed, up to which the drive turns its motor.
+#[tokio::test(start_paused = true)]
+async fn a_start_at_a_reference_that_stands_above_the_high_speed_is_told_at_that() {
+    let mut drive =
+        watched(&[&FOR_THE_BUS, &STANDS, &RUNS, &[(LFR, 600), (3202, 500), (3203, 600), (3105, 50)]]).await;
+    let started = drive.start(Direction::Forward).await.unwrap();
+    assert_eq!(started.reference, Some(Frequency::from_hertz(50)));
+}

@@ -155,6 +155,7 @@ impl<P: Port> Drivecom for Atv58<P> {
             _ => RunShown::InForce,
         };
         if shown != RunShown::NotYet {
+            status.reference = status.reference.map(|reference| self.proof.turns_at(reference));
             // The setpoint that the run command found is the one that it is to follow from now on.
             self.proof.is_to_follow((W401.address(), reference));
             status.verdict = Some(Verdict::InForce);

@@ -279,3 +279,11 @@ async fn a_reference_from_elsewhere_that_never_stands_still_is_told_as_another_o
     let told = lacks_within(&mut drive, 20).await;
     assert_eq!(told.map(|(lack, _)| lack), Some(Lack::Reference));
 }
+
+/// The reference before the ramp is above the high speed, up to which the drive turns its motor.
+#[tokio::test(start_paused = true)]
+async fn a_start_at_a_reference_that_stands_above_the_high_speed_is_told_at_that() {
+    let mut drive = drive(&[&STANDS, &RUNS, &[(401, 600), (450, 600), (451, 500), (251, 50)]]);
+    let started = drive.start(Direction::Forward).await.unwrap();
+    assert_eq!(started.reference, Some(Frequency::from_hertz(50)));
+}

@@ -226,6 +226,13 @@ impl<L: Copy + PartialEq> Proof<L> {
         self.limits.filter(|(_, at)| at.elapsed() < LIMITS_HOLD).map(|(limits, _)| limits)
     }
 
+    /// At what a motor turns that is asked for this by the reference before the ramp: within the limits, as far as they were read. Whether
+    /// `FrH` is kept between them no manual says.
+    #[must_use]
+    pub fn turns_at(&self, frh: Frequency) -> Frequency {
+        self.limits().flatten().map_or(frh, |(low, high)| frh.max(low).min(high))
+    }
+
     /// Takes the limits as they were just read. Whether they are others than before, which is a ground that has changed.
     pub fn take_limits(&mut self, limits: Option<Limits>) -> bool {
         let before = self.limits.replace((limits, Instant::now()));

@@ -268,7 +268,8 @@ impl fmt::Display for Outcome {
 pub struct Started {
     /// Which way.
     pub direction: Direction,
-    /// The setpoint that it uses, as the drive told it with the start; `None` where its words do not hold it.
+    /// The setpoint that it uses, as the drive told it with the start, and within the limits up to which that turns its motor; `None` where
+    /// its words do not hold it.
     #[cfg_attr(feature = "serde", serde(rename = "reference_hz", skip_serializing_if = "Option::is_none"))]
     pub reference: Option<Frequency>,
     /// Its motor still turned the other way then, and comes down first.

@@ -470,3 +470,11 @@ async fn a_run_that_is_adopted_is_in_force_only_once_its_word_and_its_reference_
         drive.forget();
     }
 }
+
+/// FA01 and FE02 are above the upper limit UL, up to which the drive turns its motor.
+#[tokio::test(start_paused = true)]
+async fn a_start_at_a_reference_that_stands_above_the_upper_limit_is_told_at_that() {
+    let mut drive = driver(words(&[(0xFA01, 6_000), (0xFE02, 6_000), (0xFD00, 5_000)]));
+    let started = drive.start(Direction::Forward).await.unwrap();
+    assert_eq!(started.reference, Some(Frequency::from_hertz(50)));
+}

@@ -364,10 +364,16 @@ async fn command_words_are_those_of_8_4_with_and_without_the_priorities() {
             // Others of these words have said the same as each other: what is new behind them is asked twice.
             ("01 03 FA00 0001", &held),
             ("01 03 FA00 0001", &held),
+            // UL, up to which it turns.
+            ("01 03 0012 0001", "01 03 02 1388"),
         ]);
         let (line, other_end) = scripted(&script);
         let mut drive = Atv21::new(line.slave(1), bench::address(1)).with_authority(authority);
-        assert_eq!(drive.start(direction).await.unwrap().direction, Some(direction));
+        let started = drive.start(direction).await.unwrap();
+        assert_eq!(
+            (started.direction, started.reference),
+            (Some(direction), Some(Frequency::from_hertz(50)))
+        );
         other_end.is_done().await;
     }
 }
