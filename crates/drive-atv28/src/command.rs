@@ -90,6 +90,10 @@ impl<P: Port> Drivecom for Atv28<P> {
         self.registers.owe_judgement();
     }
 
+    fn tell_follower(&self, status: &Status) {
+        self.registers.tell_follower(status);
+    }
+
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         self.fast_status(class).await
     }

@@ -180,6 +180,10 @@ impl<P: Port> Drivecom for Atv312<P> {
         self.registers.owe_judgement();
     }
 
+    fn tell_follower(&self, status: &Status) {
+        self.registers.tell_follower(status);
+    }
+
     fn as_written(&self, word: u16) -> u16 {
         word | self.known.settings.kept(self.high_bits)
     }

@@ -94,6 +94,10 @@ impl<P: Port> Drivecom for Atv58<P> {
         self.registers.owe_judgement();
     }
 
+    fn tell_follower(&self, status: &Status) {
+        self.registers.tell_follower(status);
+    }
+
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         let status = self.fast_status(class).await?;
         let verdict = self.evidence(&status).and_then(|evidence| self.proof.watch.run.verdict(&evidence));

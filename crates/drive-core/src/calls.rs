@@ -11,6 +11,7 @@ use crate::{
     address::SlaveAddress,
     capabilities::Capabilities,
     confirm::{CONFIRMED_WITHIN, Confirming},
+    drive::Follower,
     error::{BUSY, Error, ErrorKind, ExceptionMeaning, Exchange, Result},
     identity::Identity,
     kept_readings::KeptReadings,
@@ -105,6 +106,8 @@ pub struct Registers<P> {
     pub lifetimes: Lifetimes,
     /// What long jobs have read that were cut.
     pub kept: KeptReadings,
+    /// Who follows a stop that does not show: see [`Drive::follow_stops`](crate::Drive::follow_stops).
+    pub follower: Option<Follower>,
 }
 
 impl<P: Port> Registers<P> {
@@ -134,6 +137,14 @@ impl<P: Port> Registers<P> {
             judged_until: None,
             lifetimes,
             kept,
+            follower: None,
+        }
+    }
+
+    /// Tells whoever follows it a status behind a stop that does not show yet. Of the run command that is to end it says nothing.
+    pub fn tell_follower(&self, status: &Status) {
+        if let Some(follower) = &self.follower {
+            follower.send_replace(Some(Status { verdict: None, ..status.clone() }));
         }
     }
 
@@ -257,6 +268,10 @@ macro_rules! told_by {
 
         fn kept_mut(&mut self) -> Option<&mut $crate::KeptReadings> {
             Some(&mut self.$registers.kept)
+        }
+
+        fn follow_stops(&mut self, follower: $crate::Follower) {
+            self.$registers.follower = Some(follower);
         }
     };
 }

@@ -34,6 +34,9 @@ pub struct BroadcastWrite {
     pub value: u16,
 }
 
+/// The end that a [drive tells](Drive::follow_stops): the last status, once there is one.
+pub type Follower = tokio::sync::watch::Sender<Option<Status>>;
+
 /// A variable-speed drive on a line.
 ///
 /// One value stands for one slave. It knows the family's registers and nothing of the line: every exchange goes
@@ -343,6 +346,12 @@ pub trait Drive: Send {
     async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
         let _ = (register, word);
         Intent::kept()
+    }
+
+    /// Who hears of each status that a [`stop`](Self::stop) reads which does not show it yet: so a stop that is not obeyed, and is waited
+    /// for as long as any, leaves nobody with what was so before it. It may tell nothing.
+    fn follow_stops(&mut self, follower: Follower) {
+        drop(follower);
     }
 
     /// By which stop the values stop the motor that another master would write at once, where no [word](Self::intent) of them tells that by

@@ -60,7 +60,7 @@ pub use capabilities::{
     AnswerDelay, Capabilities, LineMismatch, Reaction, StatusBit, Watchdog, WatchdogCapability,
 };
 pub use confirm::{CONFIRMED_WITHIN, Confirming, SETTLED_WITHIN};
-pub use drive::{BroadcastWrite, Drive};
+pub use drive::{BroadcastWrite, Drive, Follower};
 pub use error::{Error, ErrorKind, ExceptionMeaning, Exchange, NEGATIVE_REPLY, Result, SetpointProblem};
 pub use faults::{Fault, FaultEntry, Faults};
 pub use identity::Identity;

@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use drive_core::{Class, Direction, Drive, Error, Ground, Lease, Lifetimes, Refusal, Setpoint};
+use drive_core::{Class, Direction, Drive, Error, Follower, Ground, Lease, Lifetimes, Refusal, Setpoint};
 use tokio::time::Instant;
 
 use crate::{
@@ -53,6 +53,11 @@ impl Driver {
             drive.accept_self_restart(&accepted);
             drive.set_coast_time(settings.coast);
         });
+    }
+
+    /// Who hears of what a stop reads that does not show yet.
+    pub(crate) fn follow_stops(&mut self, follower: Follower) {
+        self.at_once((), |drive| drive.follow_stops(follower));
     }
 
     pub(crate) fn set_injection_time(&mut self, time: Option<Duration>) {

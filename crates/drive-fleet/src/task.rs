@@ -9,7 +9,7 @@ use std::{
 };
 
 use drive_bus::{Latest, Slave};
-use drive_core::{Drive, Lease};
+use drive_core::{Drive, Lease, Status};
 use futures_util::{FutureExt, future::poll_immediate};
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
@@ -53,8 +53,11 @@ impl Task {
     pub(crate) async fn run(self) {
         let Self { drive, desk, messages, urgent, turns, keeper, answers } = self;
         let (losses, retractions) = (answers.port_losses(), answers.retractions());
+        let (follower, followed) = watch::channel(None);
+        let mut driver = Driver::new(drive);
+        driver.follow_stops(follower);
         let mut talk = Talk {
-            driver: Driver::new(drive),
+            driver,
             desk,
             messages,
             open: true,
@@ -65,6 +68,7 @@ impl Task {
             answers,
             losses,
             retractions,
+            followed,
         };
         while let Err(panic) = AssertUnwindSafe(talk.go_on()).catch_unwind().await {
             let in_a_call = talk.desk.supervisor.handle_panicked(Instant::now(), said(&*panic));
@@ -90,13 +94,27 @@ struct Talk {
     answers: Slave,
     losses: Latest<u64>,
     retractions: Latest<u64>,
+    /// What a stop has read that does not show yet.
+    followed: watch::Receiver<Option<Status>>,
 }
 
 impl Talk {
     /// Until it is over.
     async fn go_on(&mut self) {
-        let Self { driver, desk, messages, open, held, urgent, turns, keeper, answers, losses, retractions } =
-            self;
+        let Self {
+            driver,
+            desk,
+            messages,
+            open,
+            held,
+            urgent,
+            turns,
+            keeper,
+            answers,
+            losses,
+            retractions,
+            followed,
+        } = self;
         // Kept across the steps, so that a drive does not lose its place in the row.
         let mut waits_for_turn = None;
         let mut turn: Option<OwnedSemaphorePermit> = None;
@@ -222,6 +240,13 @@ impl Talk {
                         desk.supervisor.handle_reply(Instant::now(), reply);
                         break;
                     }
+                    // A stop that is not obeyed is waited for by its driver alone: what that reads meanwhile is what is so.
+                    status = next_of(followed), if talking => {
+                        if let Some(status) = status {
+                            desk.supervisor.handle_followed(Instant::now(), status);
+                        }
+                        false
+                    }
                     granted = next_turn(&mut waits_for_turn) => {
                         waits_for_turn = None;
                         turn = granted;
@@ -271,6 +296,14 @@ async fn changed(count: &mut Latest<u64>) {
     if count.changed().await.is_err() {
         // Nobody will tell it any more.
         std::future::pending::<()>().await;
+    }
+}
+
+/// The next status of a stop, and for ever where none is told.
+async fn next_of(followed: &mut watch::Receiver<Option<Status>>) -> Option<Status> {
+    match followed.changed().await {
+        Ok(()) => followed.borrow_and_update().clone(),
+        Err(_) => std::future::pending().await,
     }
 }
 

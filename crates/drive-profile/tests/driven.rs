@@ -1103,3 +1103,30 @@ async fn a_stop_by_a_coil_or_by_several_registers_is_known_among_all_that_is_wri
     }
     assert!(drive.intent(0x2000, 1).await.is_err(), "half of it is none");
 }
+
+/// A Goodrive that takes every stop and runs on by the bus, at 20 Hz.
+#[tokio::test(start_paused = true)]
+async fn who_follows_a_stop_that_is_not_obeyed_hears_of_each_status_that_is_read_for_it() {
+    let family = family("goodrive");
+    let runs = [(0x2000, 1), (0x2100, 1), (0x2101, 0x0040), (0x3000, 2_000), (0x3001, 2_000)];
+    let mut words = drive_testing::words::Words::new(family.capabilities(), &runs);
+    words.deaf = true;
+    let mut drive = family.open_with(words, 1.try_into().unwrap(), &family.simulated_options());
+    let (follower, mut followed) = tokio::sync::watch::channel(None);
+    drive.follow_stops(follower);
+    let mut stop = std::pin::pin!(drive.stop(StopMode::Ramp));
+    let mut heard = 0;
+    let stopped = loop {
+        tokio::select! {
+            biased;
+            stopped = &mut stop => break stopped,
+            told = followed.changed() => {
+                told.expect("the drive is there");
+                let status = followed.borrow_and_update().clone().expect("it is told");
+                assert_eq!((status.state, status.verdict), (State::Running, None), "{status:?}");
+                heard += 1;
+            }
+        }
+    };
+    assert!(stopped.is_err() && heard > 10, "{heard}: {stopped:?}");
+}

@@ -75,6 +75,8 @@ impl Drivecom for Chart {
 
     fn owes_judgement(&mut self) {}
 
+    fn tell_follower(&self, _: &Status) {}
+
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         self.classes.push(class);
         self.reads += 1;

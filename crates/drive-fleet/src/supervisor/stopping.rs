@@ -327,6 +327,13 @@ impl Supervisor {
         (stopping.next_try? <= now).then_some(Job::Stop(stopping.mode))
     }
 
+    /// What the attempt has read that is under way: it does not show the stop yet.
+    pub(crate) fn handle_followed(&mut self, now: Instant, status: Status) {
+        if matches!(self.in_flight, Some(Job::Stop(_))) {
+            self.accept_status(now, status);
+        }
+    }
+
     pub(super) fn handle_stopped(&mut self, now: Instant, result: Result<Stopped>) {
         let standstill = self.settings.times.standstill;
         let Some(stopping) = &mut self.stopping else { return };

@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Capabilities, Direction, Drive, Error, Faults, Frequency, Ground, Identity, Intent,
-    KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, Reaction, Recognised, Refusal, Result, Row,
-    SelfRestart, Setpoint, SlaveAddress, Status, StopMode, Stopped, Verdict, Watchdog, WatchdogCapability,
-    Withdrawn, Written, registers::Place,
+    BroadcastWrite, Capabilities, Direction, Drive, Error, Faults, Follower, Frequency, Ground, Identity,
+    Intent, KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, Reaction, Recognised, Refusal,
+    Result, Row, SelfRestart, Setpoint, SlaveAddress, Status, StopMode, Stopped, Verdict, Watchdog,
+    WatchdogCapability, Withdrawn, Written, registers::Place,
 };
 
 use super::{Mutant, port::Tap};
@@ -233,6 +233,10 @@ impl Drive for Faulty {
 
     async fn intent(&mut self, register: u16, word: u16) -> Result<Option<Intent>> {
         self.drive.intent(register, word).await
+    }
+
+    fn follow_stops(&mut self, follower: Follower) {
+        self.drive.follow_stops(follower);
     }
 
     fn stopped_by(&self, written: &[(Place, u16)]) -> Option<StopMode> {
