@@ -222,7 +222,7 @@ impl<P: Port> Drivecom for Atv312<P> {
         if let Some(reason) = self.recognise_itself().await? {
             return Ok(Some(reason));
         }
-        self.read_meanings(Class::Command).await?;
+        self.read_for_a_start(Class::Command).await?;
         let controls = self.read_controls(Class::Command).await?;
         let fast = FastWords::in_status(status);
         if let Some(reason) = fast.refuses_while_saving() {

@@ -173,7 +173,7 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
     let mut status = drive.read_status(Class::Command).await?;
     let mut climb = climb_from(drive, direction, None, &status).await?.map_err(refused)?;
     let mut confirming = Confirming::begin();
-    let (mut is_begun, mut given, mut is_late) = (false, false, false);
+    let (mut given, mut is_late) = (false, false);
     let mut shown = RunShown::NotYet;
     let because = loop {
         let waits = match chart_of(eta, &status).map(|state| climb.next(state)) {
@@ -192,15 +192,10 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
                     keep_lease(drive.own_run(), &written);
                     drive.owes_judgement();
                 }
-                let is_first = !std::mem::replace(&mut is_begun, true);
                 match written {
                     Err(error) if means(&error, ExceptionMeaning::Busy) => {
                         climb.forget_written();
                         true
-                    }
-                    // The words before it were sent.
-                    Err(error) if !is_first && error.kind() == ErrorKind::NotSent => {
-                        return Err(error.after_write());
                     }
                     Err(error) if !means(&error, ExceptionMeaning::Accepted) => return Err(error),
                     _ => {
@@ -238,8 +233,8 @@ pub async fn start<D: Drivecom>(drive: &mut D, direction: Direction, word: u16) 
             (is_late, confirming) = (true, Confirming::within(more));
         }
         let read = drive.read_status(Class::Command).await;
-        // Once a word was written, an exchange that fails says nothing of what it has done.
-        status = read.map_err(|error| if is_begun { error.after_write() } else { error })?;
+        // Once the run command was written, an exchange that fails says nothing of the motor.
+        status = read.map_err(|error| if given { error.after_write() } else { error })?;
     };
     Err(Error::NotConfirmed { slave, command, status: Box::new(status), because })
 }

@@ -532,17 +532,19 @@ impl StatusWords {
 
     /// Whether the drive itself shows that no run command acts after the stop `word`: it has left "operation enabled",
     /// or there, where the word keeps it, the motor stands, or the bus commands and the motor slows down or is braked:
-    /// one that somebody else has running obeys no word of ours, and slows down for reasons of his. A quick stop still
-    /// drives the motor, so it does not show a stop without voltage.
+    /// one that somebody else has running obeys no word of ours, and slows down for reasons of his. Where somebody else
+    /// commands, no word of ours leads out of "operation enabled": there the motor that nothing drives shows every stop. A
+    /// quick stop still drives the motor, so it does not show a stop without voltage.
     #[must_use]
     pub fn shows_stop(self, word: ControlWord) -> bool {
         const BRAKES: ExtendedStatus =
             ExtendedStatus::DECELERATING.union(ExtendedStatus::FAST_STOP).union(ExtendedStatus::DC_INJECTION);
         match self.chart() {
             None | Some(ChartState::NotReadyToSwitchOn) => false,
+            Some(ChartState::OperationEnabled) if self.control() != Control::Bus => !self.is_driving(),
             Some(ChartState::OperationEnabled) => {
                 word.contains(ControlWord::ENABLE_OPERATION)
-                    && (!self.is_turning() || self.control() == Control::Bus && self.eti.intersects(BRAKES))
+                    && (!self.is_turning() || self.eti.intersects(BRAKES))
             }
             Some(ChartState::QuickStopActive) => word.contains(ControlWord::ENABLE_VOLTAGE),
             Some(_) => true,
@@ -710,7 +712,11 @@ mod tests {
         assert_eq!(shown(by_terminals), [false; 3], "the terminals slow it down to another speed");
         let forced_local = StatusWords::new(0x0027, 0x4410);
         assert_eq!(shown(forced_local), [false; 3]);
-        let standing = StatusWords::new(0x0227, 0x0000);
+        let released = StatusWords::new(0x0227, 0x0000);
+        assert_eq!(shown(released), [true; 3], "the terminals command a motor that nothing drives");
+        let held = StatusWords::new(0x0227, 0x0020);
+        assert_eq!(shown(held), [false; 3], "they brake it with direct current");
+        let standing = StatusWords::new(0x0227, 0x4000);
         assert_eq!(shown(standing), [true, false, false]);
         assert_eq!(shown(StatusWords::new(0x0200, 0)), [false; 3], "initialising");
         assert_eq!(shown(StatusWords::new(0x0201, 0)), [false; 3], "a pattern that the table does not have");

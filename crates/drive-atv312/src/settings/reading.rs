@@ -45,8 +45,12 @@ impl<P: Port> Atv312<P> {
     /// The settings, and anew those that decide what a command word does. A drive takes them while its motor stands alone, so that what is
     /// read for a start holds for its stop.
     pub(crate) async fn read_meanings(&mut self, class: Class) -> Result<()> {
-        let blocks = BLOCKS.iter().take(FOR_A_STOP.1).map(|(first, ..)| *first);
-        self.read_again(class, &blocks.collect::<Vec<_>>()).await
+        self.read_again(class, &meanings().collect::<Vec<_>>()).await
+    }
+
+    /// The same with what would start the motor again by itself: a start rests on that it does not.
+    pub(crate) async fn read_for_a_start(&mut self, class: Class) -> Result<()> {
+        self.read_again(class, &meanings().chain([address::ATR]).collect::<Vec<_>>()).await
     }
 
     async fn read_again(&mut self, class: Class, blocks: &[u16]) -> Result<()> {
@@ -150,6 +154,11 @@ impl<P: Port> Atv312<P> {
         self.take_extended(controls.cmi);
         Ok(controls)
     }
+}
+
+/// The blocks that decide what a command word does.
+fn meanings() -> impl Iterator<Item = u16> {
+    BLOCKS.iter().take(FOR_A_STOP.1).map(|(first, ..)| *first)
 }
 
 /// The control variables.

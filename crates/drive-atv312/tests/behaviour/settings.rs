@@ -94,6 +94,36 @@ async fn control_goes_to_the_bus_only_when_asked_and_back_to_the_terminals() {
     ));
 }
 
+/// What stops it is read anew behind a release, so that its first stop is the quick stop, which means nothing where the terminals command.
+#[tokio::test(start_paused = true)]
+async fn every_stop_of_a_drive_at_rest_that_was_released_is_confirmed() {
+    for mode in StopMode::ALL {
+        let (mut drive, machine, _line) = running().await;
+        drive.stop(StopMode::Ramp).await.unwrap();
+        machine.wait_until(|seen| !seen.running).await;
+        drive.release().await.unwrap();
+        let stopped = drive.stop(mode).await.unwrap();
+        assert_eq!(
+            stopped.status.control,
+            Some(Control::Local),
+            "{mode}: it was not taken from the terminals"
+        );
+    }
+}
+
+/// Somebody sets it at the keypad while the drive is watched (BBV51701 p. 51): the drive would restart by itself behind a fault.
+#[tokio::test(start_paused = true)]
+async fn an_automatic_restart_that_was_switched_on_since_the_settings_were_read_refuses_a_start() {
+    let (mut drive, machine, _line) = running().await;
+    drive.stop(StopMode::Ramp).await.unwrap();
+    machine.wait_until(|seen| !seen.running).await;
+    machine.poke(row("Atr").address, 1);
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert!(matches!(refusal(&error), Some(Refusal::RestartsItself(_))), "{error}");
+    machine.poke(row("Atr").address, 0);
+    drive.start(Direction::Forward).await.unwrap();
+}
+
 #[tokio::test(start_paused = true)]
 async fn control_is_not_given_back_while_the_motor_runs_nor_where_the_drive_chooses() {
     let (mut drive, machine, _line) = running().await;
