@@ -417,7 +417,8 @@ impl Supervisor {
                 stopping.undone(now, &status.value, standstill);
             }
             _ => {
-                if motion == Motion::Braking {
+                // What direct current holds has no output that could come down; its own time ends it.
+                if motion == Motion::Braking && !injects {
                     stopping.comes_down(now, output, standstill);
                 }
                 // Another drive that stands there says nothing of the motor that was to be stopped.

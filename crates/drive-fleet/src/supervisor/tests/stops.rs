@@ -171,7 +171,11 @@ fn an_injection_of_which_nobody_knows_when_the_motor_stands_is_ended_before_it_h
     let stopped = Stopped::by(StopMode::DcInjection, braking.clone());
     rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(stopped)));
     rig.drive.status = braking;
-    rig.pass(40_000 * MS);
+    rig.pass(25_000 * MS);
+    // It is held as it was asked to be, at an output that cannot come down any more.
+    let is_alarm = |rig: &Rig| rig.snapshot().stop.is_some_and(|stop| stop.alarm);
+    assert!(!is_alarm(&rig), "{:?}", rig.outputs);
+    rig.pass(15_000 * MS);
     assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp)]);
 }
 
