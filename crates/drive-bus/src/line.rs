@@ -222,8 +222,8 @@ impl Line {
         self.handle.shared.last.forget(before);
     }
 
-    /// Closes the line: what waits ends with [`PortError::Closed`](drive_core::PortError::Closed), the exchange that is
-    /// under way finishes, the port is closed. Returns when it is.
+    /// Closes the line: what waits ends with [`PortError::Closed`](drive_core::PortError::Closed), but for the write of a stop, which
+    /// is sent; the exchange that is under way finishes, the port is closed. Returns when it is.
     pub async fn close(&self) {
         self.handle.close().await;
     }

@@ -43,6 +43,29 @@ async fn a_stop_whose_caller_has_gone_is_sent_and_repeated_until_it_is_answered_
     assert_eq!(dropped(Class::Stop, true).await, vec![rtu::frame(4, &[6, 0, 20, 0, 1]); 3]);
 }
 
+/// The end of a request of a service: call, drive and line go together, while others wait at the line.
+#[tokio::test(start_paused = true)]
+async fn a_stop_whose_caller_and_whose_line_have_gone_is_sent_and_nothing_else() {
+    let (line, mut peer) = line(|config| config);
+    let mut other = line.slave(4).with_terms(Terms::of(Class::Stop));
+    let first = reads(line.slave(3), 10, 1);
+    peer.request().await;
+    let waiting = reads(line.slave(5), 30, 1);
+    let call = tokio::spawn(async move { write(&mut other, 20, 1).await });
+    yield_now().await;
+    for call in [&first, &waiting] {
+        call.abort();
+    }
+    call.abort();
+    drop(line);
+    peer.after(5 * MS, &rtu::frame(3, &[3, 2, 0, 10])).await;
+    let stop = rtu::frame(4, &[6, 0, 20, 0, 1]);
+    assert_eq!(peer.request().await, stop);
+    peer.after(5 * MS, &stop).await;
+    let until = Instant::now() + 5_000 * MS;
+    assert_eq!(timeout_at(until, peer.closed()).await, Ok(true), "the port is closed behind it");
+}
+
 #[tokio::test(start_paused = true)]
 async fn whatever_else_was_dropped_before_it_was_sent_never_is() {
     for class in [Class::Command, Class::KeepAlive, Class::Status, Class::Background] {

@@ -68,7 +68,7 @@ impl<C> Master<C> {
                 || crate::mutant!("command-repeated-behind-stop", stopped, false)
                 || crate::mutant!("old-setpoint-repeated", replaced, false)
                 || is_asked_still
-                || self.closing)
+                || self.closing && entry.terms.class != Class::Stop)
     }
 
     /// The port is lost with exchanges under way. A read waits for the next port, and so does a stop; any other write has an

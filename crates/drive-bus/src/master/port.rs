@@ -74,10 +74,13 @@ impl<C> Master<C> {
         }
     }
 
-    /// The line is to be closed.
+    /// The line is to be closed. A stop that waits there is sent before, where there is a port: whoever has given it may have gone, and
+    /// nobody else would stop the motor.
     pub fn handle_close(&mut self) {
         self.closing = true;
-        for entry in self.schedule.withdraw_all(|_| true) {
+        let is_open = matches!(self.port, PortState::Open);
+        let is_stop = |entry: &Entry<Asked<C>>| entry.terms.class == Class::Stop && entry.work.is_write;
+        for entry in self.schedule.withdraw_all(|entry| !(is_open && is_stop(entry))) {
             self.drop_unsent(entry, PortError::Closed);
         }
     }
@@ -85,6 +88,7 @@ impl<C> Master<C> {
     /// Whether the line is closed and nothing is under way any more.
     #[must_use]
     pub fn is_finished(&self) -> bool {
-        self.closing && self.flight.is_none() && self.aside.is_empty()
+        let owes_stop = matches!(self.port, PortState::Open) && !self.schedule.is_empty();
+        self.closing && self.flight.is_none() && self.aside.is_empty() && !owes_stop
     }
 }

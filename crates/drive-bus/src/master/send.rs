@@ -48,7 +48,7 @@ impl<C> Master<C> {
             return None;
         }
         let aside = self.next_aside();
-        if self.closing && aside.is_none() {
+        if self.closing && aside.is_none() && self.schedule.is_empty() {
             return None;
         }
         let free_at = self.free_at();

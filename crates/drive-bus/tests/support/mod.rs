@@ -56,6 +56,11 @@ impl Peer {
         bytes
     }
 
+    /// Whether the port is closed, and nothing more comes before that.
+    pub(crate) async fn closed(&mut self) -> bool {
+        self.stream.read(&mut [0; 512]).await.unwrap() == 0
+    }
+
     /// The next request, answered at once with `pdu` by the slave that it was for.
     pub(crate) async fn answer(&mut self, pdu: &[u8]) -> Vec<u8> {
         let request = self.request().await;
