@@ -90,6 +90,20 @@ async fn a_setpoint_whose_call_was_dropped_is_no_other_masters() {
     }
 }
 
+/// Whoever opens a drive over a line has not to know of its pause.
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_is_opened_over_a_line_has_its_pause_without_anybody_who_configures_it() {
+    for family in FAMILIES {
+        let (plant, _machine, line) = plant(family);
+        let slave = 1.try_into().unwrap();
+        let mut drive = family.open_with(line.slave(1), slave, &family.simulated_options());
+        for _ in 0..20 {
+            drive.status().await.unwrap();
+        }
+        assert_eq!(plant.violations(), [], "{family}");
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_setpoint_whose_answers_are_lost_does_not_stop_the_motor_that_goes_on() {
     for family in FAMILIES {

@@ -1,6 +1,6 @@
 //! [`Slave`]: one slave of a line as a tokio-modbus client and as a drive's port.
 
-use std::{fmt, io, sync::Arc};
+use std::{fmt, io, sync::Arc, time::Duration};
 
 use async_trait::async_trait;
 use drive_core::{Port, PortError, SlaveAddress, Terms};
@@ -12,6 +12,7 @@ use tokio_modbus::{
 };
 
 use crate::{
+    config::SlaveSettings,
     latest::Latest,
     schedule::Ticket,
     shared::{Caller, Handle},
@@ -169,6 +170,15 @@ impl SlaveContext for Slave {
 impl Port for Slave {
     fn set_terms(&mut self, terms: Terms) {
         self.terms = terms;
+    }
+
+    /// Unless the line keeps a longer one already.
+    fn wants_pause(&mut self, pause: Duration) {
+        let mut master = self.handle.shared.master();
+        let kept = master.config().slaves.get(&self.address).copied().unwrap_or_default();
+        if kept.turnaround < pause {
+            master.configure_slave(self.address, SlaveSettings { turnaround: pause, ..kept });
+        }
     }
 
     fn asked_at(&self) -> Option<Instant> {

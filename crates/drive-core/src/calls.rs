@@ -124,6 +124,7 @@ impl<P: Port> Registers<P> {
         // A port that was made for another slave keeps it, so that nothing goes to a drive that is not meant.
         if elsewhere.is_none() {
             port.set_slave(Slave(slave.number()));
+            port.wants_pause(capabilities.turnaround);
         }
         let (lifetimes, kept) = (Lifetimes::default(), KeptReadings::default());
         Self {

@@ -147,6 +147,12 @@ pub trait Port: Client {
         None
     }
 
+    /// The drive behind it needs at least this silence after its answers, before the next request to it: its family says so as it is made.
+    /// A port that keeps no pauses leaves that to whoever has it.
+    fn wants_pause(&mut self, pause: Duration) {
+        let _ = pause;
+    }
+
     /// When the exchange that brought the last answer began; `None` where the port does not keep it. A value is not older than
     /// that, and may be: whoever shows one age shows this one, however long the exchange took and whenever its caller was
     /// told.
@@ -181,6 +187,10 @@ impl SlaveContext for Box<dyn Port> {
 impl Port for Box<dyn Port> {
     fn set_terms(&mut self, terms: Terms) {
         (**self).set_terms(terms);
+    }
+
+    fn wants_pause(&mut self, pause: Duration) {
+        (**self).wants_pause(pause);
     }
 
     fn made_for(&self) -> Option<SlaveAddress> {

@@ -6,9 +6,9 @@ use std::{
     time::Duration,
 };
 
-use drive_bus::{Line, Slave, SlaveSettings};
+use drive_bus::{Line, Slave};
 use drive_core::{
-    Capabilities, Drive, INJECTION_AT_MOST, LineMismatch, SlaveAddress, SlaveAddressError, StopMode,
+    Capabilities, Drive, INJECTION_AT_MOST, LineMismatch, Port, SlaveAddress, SlaveAddressError, StopMode,
     WatchdogCapability,
 };
 use tokio::{
@@ -396,13 +396,9 @@ impl Member {
         }
     }
 
-    /// Has the line keep the pause that the drive needs after its answers, unless it keeps a longer one.
+    /// Has the line keep the pause that the drive needs after its answers, also one that has not said so to its port.
     fn keep_pause(&self, line: &Line) {
-        let (slave, pause) = (self.drive.slave().number(), self.drive.capabilities().turnaround);
-        let kept = line.config().slaves.get(&slave).copied().unwrap_or_default();
-        if kept.turnaround < pause {
-            line.configure_slave(slave, SlaveSettings { turnaround: pause, ..kept });
-        }
+        line.slave(self.drive.slave().number()).wants_pause(self.drive.capabilities().turnaround);
     }
 }
 
