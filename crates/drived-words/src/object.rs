@@ -28,6 +28,17 @@ impl Object {
         })
     }
 
+    /// The members with which a text begins as an object, as far as they are whole; what is no text in them is replaced. For what may be
+    /// understood of something cut off, and for nothing that moves a motor.
+    #[must_use]
+    pub fn begun(text: &[u8]) -> Self {
+        let text = String::from_utf8_lossy(text);
+        let mut begun = Self::default();
+        // Where it ends is no matter: what was read until then stands.
+        let _ = serde_json::Deserializer::from_str(&text).deserialize_map(Members(&mut begun));
+        begun
+    }
+
     pub fn members(&self) -> impl Iterator<Item = (&str, &Value)> {
         self.members.iter().map(|(key, value)| (key.as_str(), value))
     }
@@ -154,14 +165,31 @@ impl<'de> Visitor<'de> for Reading {
         Ok(Node::Other(Value::Array(elements), within.twice, within.null))
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Node, A::Error> {
-        let (mut object, mut known) = (Object::default(), HashSet::new());
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Node, A::Error> {
+        let mut object = Object::default();
+        Members(&mut object).visit_map(map)?;
+        Ok(Node::Object(object))
+    }
+}
+
+/// Reads members into an object, which has those before an error.
+struct Members<'a>(&'a mut Object);
+
+impl<'de> Visitor<'de> for Members<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object in JSON")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        let mut known = HashSet::new();
         while let Some((key, node)) = map.next_entry::<String, Node>()? {
             let is_known = !known.insert(key.clone());
-            let value = object.note(&key, is_known, node);
-            object.members.push((key, value));
+            let value = self.0.note(&key, is_known, node);
+            self.0.members.push((key, value));
         }
-        Ok(Node::Object(object))
+        Ok(())
     }
 }
 
@@ -187,6 +215,23 @@ mod tests {
         let object = Object::read(br#"{"a": 1, "a": 2, "b": 3}"#).unwrap().unwrap();
         assert_eq!((object.one("a"), object.one("b")), (None, Some(&json!(3))));
         assert_eq!(object.shown(), json!({"a": [1, 2], "b": 3}));
+    }
+
+    #[test]
+    fn what_a_text_begins_with_is_known_up_to_where_it_is_cut_off() {
+        for (text, members) in [
+            (&br#"{"a": 1, "b": {"c": 2"#[..], vec![("a", json!(1))]),
+            (br#"{"a": 1, "b": 2"#, vec![("a", json!(1)), ("b", json!(2))]),
+            (br#"{"a": 1}x"#, vec![("a", json!(1))]),
+            (b"{\"a\": \"\xFF\"", vec![("a", json!("\u{FFFD}"))]),
+            (br#"{"a": "#, vec![]),
+            (br#"[{"a": 1}"#, vec![]),
+            (b"", vec![]),
+        ] {
+            let begun = Object::begun(text);
+            let known: Vec<_> = begun.members().map(|(key, value)| (key, value.clone())).collect();
+            assert_eq!(known, members, "{}", text.escape_ascii());
+        }
     }
 
     proptest! {

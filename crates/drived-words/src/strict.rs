@@ -7,8 +7,18 @@ use serde_json::{Map, Value};
 
 use crate::object::Object;
 
-/// The word of a stop.
-pub const STOP: &str = "stop";
+/// Whether a text is the word of a stop, in whatever letters and in whatever quotes or ends of a text it stands.
+#[must_use]
+pub fn is_stop(text: &str) -> bool {
+    let around = |char: char| char.is_whitespace() || char.is_control() || char == '"';
+    text.trim_matches(around).eq_ignore_ascii_case("stop")
+}
+
+/// Whether a key names what is asked for.
+#[must_use]
+pub fn is_action(key: &str) -> bool {
+    key.trim().eq_ignore_ascii_case("action")
+}
 
 /// Why it cannot be understood.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -17,7 +27,7 @@ pub enum Unclear {
     NoJson(String),
     #[error("{0}")]
     Malformed(String),
-    /// It names a stop beside something else.
+    /// It names a stop beside something else, or where something else is asked for.
     #[error("{0}: this is no stop and no start")]
     Ambiguous(String),
 }
@@ -54,13 +64,13 @@ pub fn object(text: &[u8]) -> Result<Object, Unclear> {
 /// # Errors
 /// It names one.
 pub fn unambiguous(object: &Object) -> Result<(), Unclear> {
-    let is_stop = |text: &str| text.trim().eq_ignore_ascii_case(STOP);
     for (key, value) in object.members() {
         if is_stop(key) {
             return Err(Unclear::Ambiguous(format!("{key} is no key of a command")));
         }
-        if key == "action" && value.as_str().is_some_and(is_stop) {
-            return Err(Unclear::Ambiguous(format!("its action is {value}, and not only that")));
+        if is_action(key) && value.as_str().is_some_and(is_stop) {
+            let text = format!("its action is {value} where something else is asked for as well");
+            return Err(Unclear::Ambiguous(text));
         }
     }
     Ok(())

@@ -6,7 +6,7 @@ pub const REFUSED: [(&str, &str, &str, &str); 12] = [
     (r#"{"id": "b", "action": "start", "action": "stop"}"#, "refused", "ambiguous", "action"),
     (r#"{"id": "c", "action": "start", "stop": true}"#, "refused", "ambiguous", "stop"),
     (r#"{"id": "d", "stop": {"mode": "fast"}}"#, "refused", "ambiguous", "stop"),
-    (r#"{"id": "e", "action": "STOP"}"#, "refused", "ambiguous", "action"),
+    (r#"{"id": "e", "action": "start", "action": "STOP"}"#, "refused", "ambiguous", "action"),
     (r#"{"id": "f", "action": "start", "action": "start"}"#, "refused", "malformed", "action"),
     (
         r#"{"id": "g", "action": "start", "setpoint": {"frequency_hz": 10, "frequency_hz": 50}}"#,
@@ -29,12 +29,17 @@ pub const REFUSED: [(&str, &str, &str, &str); 12] = [
 /// Texts that are no object.
 pub const NO_OBJECTS: [&str; 5] = ["null", "", "[]", "start", "{\"action\": \"start\""];
 
-/// Objects that are stops, whatever else they say.
-pub const STOPS: [&str; 6] = [
+/// What is a stop, whatever else it says and also where it does not come to its end.
+pub const STOPS: [&str; 11] = [
     r#"{"id": "s", "action": "stop"}"#,
     r#"{"id": "s", "action": "stop", "action": "stop"}"#,
     r#"{"id": "s", "action": "stop", "mode": "gently"}"#,
     r#"{"id": "s", "action": "stop", "mode": null, "expires_in_ms": 0}"#,
     r#"{"id": "s", "action": "stop", "setpoint": {"frequency_hz": 50, "frequency_hz": 50}}"#,
     r#"{"id": "s", "action": "stop", "issued_unix_ms": 1000}"#,
+    r#"{"id": "s", "action": "STOP"}"#,
+    r#"{"id": "s", "action": "stop""#,
+    r#"{"id": "s", "action": "stop"}x"#,
+    "STOP",
+    r#""stop""#,
 ];

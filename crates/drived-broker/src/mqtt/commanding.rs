@@ -5,7 +5,7 @@
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 
-use drive_core::{Direction, Setpoint, StopMode};
+use drive_core::{Direction, Setpoint};
 use serde_json::{Value, json};
 use tokio::time::Instant;
 
@@ -173,10 +173,10 @@ impl Commanding {
 fn said(verb: Verb, payload: &[u8]) -> Said {
     let text = std::str::from_utf8(payload).map(str::trim).unwrap_or_default();
     let action = match verb {
-        Verb::Command => return Said::of(text),
-        Verb::Stop => return Said::stopping(text),
+        Verb::Command => return Said::of(payload),
+        Verb::Stop => return Said::stopping(payload),
         Verb::Run => match text {
-            "stop" => Ok(Action::Stop(StopMode::Ramp.into())),
+            _ if Said::of(payload).stops().is_some() => return Said::of(payload),
             "forward" => Ok(started(Direction::Forward)),
             "reverse" => Ok(started(Direction::Reverse)),
             _ => Err("expected forward, reverse or stop".to_owned()),

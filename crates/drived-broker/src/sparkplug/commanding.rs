@@ -146,7 +146,7 @@ fn said(write: Result<Write, WriteError>) -> Said {
     let set = |setpoint| Action::Setpoint { setpoint, until: drive_fleet::Until::default() };
     match (name.as_str(), value) {
         (COMMAND, Value::String(text)) => {
-            let said = Said::of(&text);
+            let said = Said::of(text.as_bytes());
             Said { body: json!({ name: said.body }), ..said }
         }
         (SETPOINT, Value::Double(hertz)) => number::<Frequency>(hertz)

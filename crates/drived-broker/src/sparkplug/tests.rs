@@ -304,7 +304,8 @@ async fn a_stop_is_taken_whatever_else_it_says_and_under_its_id() {
         sleep(Duration::from_secs(20)).await;
         assert!(!bench.plant.machines[0].observe().running, "{text}");
         let told = last(&bench);
-        assert_eq!([&told[0], &told[1]], ["s", "confirmed"], "{text}: {told:?}");
+        assert_eq!(told[1], "confirmed", "{text}: {told:?}");
+        assert!(told[0] == "s" || !text.starts_with('{'), "{text}: {told:?}");
     }
 }
 

@@ -139,7 +139,7 @@ impl<S: Send + Sync> FromRequest<S> for Stopping {
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
         let body = json(request, state).await?;
-        Ok(Self(Said::stopping(&String::from_utf8_lossy(&body))))
+        Ok(Self(Said::stopping(&body)))
     }
 }
 

@@ -8,7 +8,7 @@ use drive_core::StopMode;
 use drive_fleet::StopOrder;
 use drived_words::{
     object::Object,
-    strict::{STOP, Unclear, object, strict, unambiguous},
+    strict::{Unclear, is_action, is_stop, object, strict, unambiguous},
 };
 use serde_json::Value;
 
@@ -29,34 +29,40 @@ pub struct Said {
 }
 
 impl Said {
-    /// An object with its `action` beside the body of the API.
-    pub fn of(text: &str) -> Self {
-        if text.trim() == STOP {
-            return Self::plain(Action::Stop(StopMode::Ramp.into()), Value::from(text));
+    /// An object with its `action` beside the body of the API. What begins as an object that stops is a
+    /// stop also where it does not come to its end.
+    pub fn of(text: &[u8]) -> Self {
+        let shown = || Value::from(String::from_utf8_lossy(text));
+        if is_stop(&String::from_utf8_lossy(text)) {
+            return Self::plain(Action::Stop(StopMode::Ramp.into()), shown());
         }
-        let object = match object(text.as_bytes()) {
-            Ok(object) => object,
-            Err(unclear) => return Self::unclear(unclear, Value::from(text)),
+        let (object, unclear) = match object(text) {
+            Ok(object) => (object, None),
+            Err(unclear) => (Object::begun(text), Some(unclear)),
         };
-        let actions: Vec<&Value> = object.all("action").collect();
-        let (body, id) = (object.shown(), object.one("id").and_then(Value::as_str));
-        let id = id.filter(|id| is_id(id)).map(str::to_owned);
-        if !actions.is_empty() && actions.iter().all(|action| **action == STOP) {
-            return Self { id, ..Self::stop(&object) };
+        let names_stop = |action: &Value| action.as_str().is_some_and(is_stop);
+        let mut actions = object.members().filter(|(key, _)| is_action(key)).peekable();
+        if actions.peek().is_some() && actions.all(|(_, action)| names_stop(action)) {
+            let stop = Self::stop(&object);
+            return Self { body: if unclear.is_some() { shown() } else { stop.body }, ..stop };
         }
+        if let Some(unclear) = unclear {
+            return Self::unclear(unambiguous(&object).err().unwrap_or(unclear), shown());
+        }
+        let id = object.one("id").and_then(Value::as_str).filter(|id| is_id(id)).map(str::to_owned);
         let action = object.one("action").and_then(|action| serde_json::from_value(action.clone()).ok());
-        Self { body, action, id, asked: asked(&object) }
+        Self { body: object.shown(), action, id, asked: asked(&object) }
     }
 
     /// What came where everything is a stop: a mode that is said once is taken, and else it is the ramp.
-    pub fn stopping(text: &str) -> Self {
-        match object(text.as_bytes()) {
-            Ok(object) => Self::stop(&object),
-            Err(_) => Self::plain(
-                Action::Stop(mode(&Value::from(text.trim())).unwrap_or(StopMode::Ramp).into()),
-                Value::from(text),
-            ),
+    pub fn stopping(text: &[u8]) -> Self {
+        let begun = || Some(Object::begun(text)).filter(|begun| begun.members().next().is_some());
+        if let Some(object) = object(text).ok().or_else(begun) {
+            return Self::stop(&object);
         }
+        let text = String::from_utf8_lossy(text);
+        let mode = mode(&Value::from(text.trim())).unwrap_or(StopMode::Ramp);
+        Self::plain(Action::Stop(mode.into()), Value::from(text))
     }
 
     fn stop(object: &Object) -> Self {
@@ -128,12 +134,82 @@ mod tests {
             (r#"{"action": "stop", "mode": "fast", "mode": "freewheel"}"#, StopMode::Ramp),
             (r#"{"action": "stop", "start": true, "setpoint": 50}"#, StopMode::Ramp),
         ] {
-            assert_eq!(Said::of(text).stops(), Some(expected.into()), "{text}");
+            assert_eq!(Said::of(text.as_bytes()).stops(), Some(expected.into()), "{text}");
         }
         for text in ["", "{", "null", "whatever", r#"{"action": "start"}"#, "\u{0}"] {
-            assert_eq!(Said::stopping(text).stops(), Some(StopMode::Ramp.into()), "{text}");
+            assert_eq!(Said::stopping(text.as_bytes()).stops(), Some(StopMode::Ramp.into()), "{text}");
         }
-        assert_eq!(Said::stopping("freewheel").stops(), Some(StopMode::Freewheel.into()));
+        assert_eq!(Said::stopping(b"freewheel").stops(), Some(StopMode::Freewheel.into()));
+        assert_eq!(Said::stopping(br#"{"mode": "freewheel""#).stops(), Some(StopMode::Freewheel.into()));
+    }
+
+    /// As a controller writes it whose buffer was too short, whose texts end with a nought, or who knows capitals only.
+    #[test]
+    fn a_stop_is_one_in_any_letters_and_also_where_it_is_cut_off_or_goes_on_behind_its_end() {
+        for (text, expected) in [
+            (&b"STOP"[..], StopMode::Ramp),
+            (b" Stop\r\n\0", StopMode::Ramp),
+            (br#""stop""#, StopMode::Ramp),
+            (br#"{"action": "STOP"}"#, StopMode::Ramp),
+            (br#"{"ACTION": "STOP"}"#, StopMode::Ramp),
+            (br#"{"action": "stop", "action": "Stop"}"#, StopMode::Ramp),
+            (br#"{"action": "stop""#, StopMode::Ramp),
+            (br#"{"action": "stop", "mode": "nonsense", "foo": 1"#, StopMode::Ramp),
+            (br#"{"action": "stop", "mode": "fast", "setpoint": {"frequ"#, StopMode::Fast),
+            (br#"{"mode": "fast", "action": "stop" "id": "a"}"#, StopMode::Fast),
+            (br#"{"action": "stop", "mode": "free"#, StopMode::Ramp),
+            (br#"{"action": "stop"}x"#, StopMode::Ramp),
+            (b"{\"id\": \"\xFF\", \"action\": \"stop\"}", StopMode::Ramp),
+        ] {
+            assert_eq!(Said::of(text).stops(), Some(expected.into()), "{}", text.escape_ascii());
+        }
+    }
+
+    #[test]
+    fn what_names_a_stop_beside_another_action_is_neither_and_what_is_cut_off_starts_nothing() {
+        for (text, is_ambiguous) in [
+            (r#"{"action": "stop", "action": "start"}"#, true),
+            (r#"{"action": "stop", "action": "start""#, true),
+            (r#"{"action": "start", "ACTION": "stop"}"#, true),
+            (r#"{"action": "start", "stop": true"#, true),
+            (r#"{"action": "stop", "action": null"#, true),
+            (r#"{"action": "start""#, false),
+            (r#"{"action": "start"}x"#, false),
+            (r#"{"action": "start", "id": "stop"#, false),
+            (r#"{"action": "sto"#, false),
+            ("stopped", false),
+            (r#"["stop"]"#, false),
+        ] {
+            let asked = Said::of(text.as_bytes()).asked;
+            match (asked, is_ambiguous) {
+                (Err(Unclear::Ambiguous(_)), true)
+                | (Err(Unclear::NoJson(_) | Unclear::Malformed(_)), false) => {}
+                (asked, _) => panic!("{text}: {asked:?}"),
+            }
+        }
+        // One that is no text would be a start by what stands in place of what nobody can read.
+        assert!(Said::of(b"{\"action\": \"start\", \"id\": \"\xFF\"}").asked.is_err());
+    }
+
+    #[test]
+    fn what_is_left_of_a_start_is_none_and_a_stop_is_one_from_its_action_on() {
+        let start = br#"{"action": "start", "setpoint": {"frequency_hz": 20}}"#;
+        assert!(Said::of(start).asked.is_ok());
+        for cut in 0..start.len() {
+            assert!(Said::of(&start[..cut]).asked.is_err(), "{cut}");
+        }
+        for behind in ["}", "x", "\0", ",", "{}", r#"{"action": "start"}"#, r#"{"action": "stop"}"#] {
+            let text = [start, behind.as_bytes()].concat();
+            assert!(Said::of(&text).asked.is_err(), "{behind}");
+        }
+        let stop = br#"{"action": "stop", "setpoint": {"frequency_hz": 20}}"#;
+        for cut in 0..stop.len() {
+            assert_eq!(
+                Said::of(&stop[..cut]).stops().is_some(),
+                cut >= r#"{"action": "stop""#.len(),
+                "{cut}"
+            );
+        }
     }
 
     #[test]
@@ -150,15 +226,15 @@ mod tests {
             (r#"{"mode": "dc_injection", "injection_ms": 1, "injection_ms": 2}"#, dc.into()),
             (r#"{"injection_ms": 3000}"#, ramp.into()),
         ] {
-            assert_eq!(Said::stopping(text).stops(), Some(expected), "{text}");
+            assert_eq!(Said::stopping(text.as_bytes()).stops(), Some(expected), "{text}");
         }
         let text = r#"{"action": "stop", "mode": "dc_injection", "injection_ms": 250}"#;
-        assert_eq!(Said::of(text).stops(), Some(StopOrder::injecting(Duration::from_millis(250))));
+        assert_eq!(Said::of(text.as_bytes()).stops(), Some(StopOrder::injecting(Duration::from_millis(250))));
     }
 
     #[test]
     fn nobody_knows_the_id_of_what_has_two() {
-        let said = Said::of(r#"{"action": "stop", "id": "a", "id": "b"}"#);
+        let said = Said::of(br#"{"action": "stop", "id": "a", "id": "b"}"#);
         assert_eq!((said.stops(), said.id), (Some(StopMode::Ramp.into()), None));
     }
 }
