@@ -87,6 +87,7 @@ export const SENTENCES_FR = {
   'see what 100 % is at the drive (its reference frequency), its lowest and highest speed, and who else gives it a setpoint': 'voir ce que valent 100 % au variateur (sa fréquence de référence), ses vitesses minimale et maximale, et qui d’autre lui donne une consigne',
   'read its faults: they name the alarm': 'lire ses défauts : ils nomment l’alarme',
   'give control back there': 'y rendre la commande',
+  'give it a setpoint: whether its output comes to that is watched from then on': 'lui donner une consigne : dès lors, il est surveillé que sa sortie y parvienne',
   'wait until it is confirmed': 'attendre qu’il soit confirmé',
   'the current heats the motor: it ends with its time, or with a ramp stop': 'le courant échauffe le moteur : il cesse à son terme, ou par un arrêt sur rampe',
   'keep away from the shaft until it is seen to stand': 'se tenir à l’écart de l’arbre tant qu’on ne l’a pas vu à l’arrêt',
