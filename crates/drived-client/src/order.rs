@@ -61,8 +61,8 @@ pub async fn order(
         match drive.outcome {
             OutcomeWord::Confirmed if args.is_json() => {}
             OutcomeWord::Confirmed => output::done(output::say(sentence(told, drive)))?,
-            // Those that are only read were never meant.
-            _ if command.outcome == OutcomeWord::Confirmed => {
+            // A stop of several asks nothing of those that are only read and stand.
+            OutcomeWord::Nothing => {
                 if !args.is_json() {
                     output::done(output::say(format_args!("{}: {}", name(drive), why(drive))))?;
                 }
@@ -166,7 +166,10 @@ fn sentence(told: &Told, command: &CommandView) -> String {
 }
 
 fn why(command: &CommandView) -> String {
-    let outcome = command.outcome.to_string().replace('_', " ");
+    let outcome = match command.outcome {
+        OutcomeWord::Nothing => "nothing to be done".to_owned(),
+        outcome => outcome.to_string().replace('_', " "),
+    };
     match command.text.as_deref() {
         Some(text) if text.starts_with(&outcome) => text.to_owned(),
         Some(text) => format!("{outcome}: {text}"),

@@ -20,7 +20,7 @@ use tokio::{
 use super::{
     Action, ActionWord, Lifetime, OutcomeWord, Request, Target,
     log::Command,
-    outcome::{GROUP_BUSY, GROUP_FAILED, GROUP_NOT_READY, of_all, told},
+    outcome::{GROUP_BUSY, GROUP_FAILED, GROUP_NOT_READY, of_all, of_watched, told},
     settle::settled,
 };
 use crate::plant::{
@@ -148,7 +148,8 @@ impl Work {
             match (request.action, member.settings().control) {
                 // A stop of several goes to those that may be commanded, and the others are accounted for at once.
                 (Action::Stop(_), false) if request.target != Target::Drive(member.name().to_string()) => {
-                    part.ended(&Outcome::Refused(drive_fleet::Refused::ReadOnly), member, request.arrived)
+                    let (word, reason, text) = of_watched(&member.snapshot());
+                    part.ended_as(word, reason, text, member, request.arrived)
                 }
                 _ => part,
             }
@@ -179,7 +180,7 @@ impl Work {
             member.is_some_and(|member| member.snapshot().link != Link::Connected)
         };
         CommandView {
-            outcome: of_all(parts.iter().map(|part| (part.outcome, part.reason.as_deref()))),
+            outcome: of_all(parts.iter().map(|part| part.outcome)),
             open: parts.iter().any(|part| part.open),
             took_ms: parts.iter().filter_map(|part| part.took_ms).max(),
             several: Some(SeveralView::of(&mut parts, is_silent)),
@@ -380,11 +381,6 @@ impl Work {
 }
 
 impl CommandView {
-    fn ended(self, outcome: &Outcome, member: &DriveHandle, arrived: Instant) -> Self {
-        let (word, reason, text) = told(outcome);
-        self.ended_as(word, reason, text, member, arrived)
-    }
-
     /// The same, ended, with what the drive shows now.
     fn ended_as(
         self,
@@ -428,3 +424,6 @@ fn new_id() -> String {
     }
     format!("c-{:016x}", u64::from_be_bytes(bytes))
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,8 +1,10 @@
 //! The words for what became of a command, which are the same at every face.
 
-use drive_fleet::{Became, Outcome, Refused};
+use drive_core::Status;
+use drive_fleet::{Became, Outcome, Refused, Snapshot};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tokio::time::Instant;
 
 /// What became of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
@@ -43,9 +45,6 @@ pub(super) const GROUP_NOT_READY: &str = "group_not_ready";
 pub(super) const GROUP_FAILED: &str = "group_failed";
 /// Another start of a group was under way for as long as this one could wait.
 pub(super) const GROUP_BUSY: &str = "group_busy";
-/// The configuration says that the drive is only read.
-pub(super) const READ_ONLY: &str = Refused::ReadOnly.word();
-
 /// The word, the reason and a sentence for an outcome of the fleet.
 pub(super) fn told(outcome: &Outcome) -> (OutcomeWord, Option<&'static str>, Option<String>) {
     let word = match outcome.became() {
@@ -60,18 +59,25 @@ pub(super) fn told(outcome: &Outcome) -> (OutcomeWord, Option<&'static str>, Opt
     (word, outcome.reason(), outcome.text())
 }
 
-/// What becomes of a command for several drives: confirmed when all are that may be commanded, pending while one is, else
-/// the worst of them.
-pub(super) fn of_all<'a>(outcomes: impl Iterator<Item = (OutcomeWord, Option<&'a str>)>) -> OutcomeWord {
-    let rank = |word| match word {
-        OutcomeWord::Nothing | OutcomeWord::Confirmed => 0,
-        OutcomeWord::Superseded => 1,
-        OutcomeWord::Refused => 2,
-        OutcomeWord::Expired => 3,
-        OutcomeWord::NotConfirmed => 4,
-        OutcomeWord::Unknown => 5,
-        OutcomeWord::Pending => 6,
+/// What becomes of a stop of several for a drive that is only read: where it shows what would confirm a stop, there is nothing to be
+/// done; where its motor turns, or nobody knows, it was not stopped.
+pub(super) fn of_watched(seen: &Snapshot) -> (OutcomeWord, Option<&'static str>, Option<String>) {
+    let (word, reason, text) = told(&Outcome::Refused(Refused::ReadOnly));
+    let needs_none = seen.fresh_status(Instant::now()).is_some_and(Status::is_undriven);
+    (if needs_none { OutcomeWord::Nothing } else { word }, reason, text)
+}
+
+/// What becomes of a command for several drives: pending while one is, else the worst of them.
+pub(super) fn of_all(outcomes: impl Iterator<Item = OutcomeWord>) -> OutcomeWord {
+    let rank = |word: &OutcomeWord| match word {
+        OutcomeWord::Nothing => 0,
+        OutcomeWord::Confirmed => 1,
+        OutcomeWord::Superseded => 2,
+        OutcomeWord::Refused => 3,
+        OutcomeWord::Expired => 4,
+        OutcomeWord::NotConfirmed => 5,
+        OutcomeWord::Unknown => 6,
+        OutcomeWord::Pending => 7,
     };
-    let commanded = outcomes.filter(|(_, reason)| *reason != Some(READ_ONLY));
-    commanded.map(|(word, _)| word).max_by_key(|word| rank(*word)).unwrap_or(OutcomeWord::Refused)
+    outcomes.max_by_key(rank).unwrap_or(OutcomeWord::Refused)
 }

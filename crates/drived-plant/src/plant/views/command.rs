@@ -67,7 +67,7 @@ pub enum Counted {
     Pending,
     /// It is not confirmed and does not answer.
     NotReachable,
-    /// The command was refused for it, such as for a drive that is only read.
+    /// The command was refused for it, or asked nothing of it, such as of a drive that is only read.
     Refused,
     /// It answers, and the command ended otherwise.
     Failed,
@@ -94,7 +94,7 @@ pub struct SeveralView {
     pub pending: usize,
     /// Those that are not confirmed and do not answer.
     pub not_reachable: usize,
-    /// Those that it was refused for, such as drives that are only read.
+    /// Those that it was refused for, or asked nothing of, such as drives that are only read.
     pub refused: usize,
     /// Those that answer and for which it ended otherwise.
     pub failed: usize,
@@ -108,7 +108,7 @@ impl SeveralView {
         for (number, drive) in drives.iter_mut().enumerate() {
             let counted = match drive.outcome {
                 OutcomeWord::Confirmed => Counted::Confirmed,
-                OutcomeWord::Refused => Counted::Refused,
+                OutcomeWord::Refused | OutcomeWord::Nothing => Counted::Refused,
                 _ if is_silent(number) => Counted::NotReachable,
                 OutcomeWord::Pending => Counted::Pending,
                 _ => Counted::Failed,

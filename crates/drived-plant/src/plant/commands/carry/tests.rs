@@ -1,0 +1,77 @@
+//! Stops of drives that somebody else commands too.
+
+use std::sync::Arc;
+
+use drive_core::StopMode;
+use drive_fleet::DriveSettings;
+use drive_sim::SimSlave;
+
+use super::*;
+use crate::plant::{commands::LIFETIME, testing::TestPlant};
+use drived_config::rights::Rights;
+
+const SECOND: Duration = Duration::from_secs(1);
+
+async fn stop(plant: &Plant, target: Target) -> Arc<CommandView> {
+    let action = Action::Stop(StopMode::Ramp.into());
+    let (caller, arrived) = (Caller::new("page", "page", Rights::ALL), Instant::now());
+    let request = Request { id: None, target, action, expects: None, lifetime: LIFETIME, arrived };
+    plant.command(&caller, request, 40 * SECOND).await.unwrap()
+}
+
+/// Another master climbs the chart and starts the motor (BBV51701, "CMD").
+fn start_by_another(machine: &SimSlave) {
+    for word in [0x0006, 0x0007, 0x000F] {
+        machine.written_by_another(8_501, word).unwrap();
+    }
+}
+
+/// Three drives, the last of which is only watched; another master has given that one a setpoint (LFR) of 25 Hz.
+async fn one_is_watched() -> TestPlant {
+    let plant = TestPlant::with(3, |name| match name.as_str() {
+        "pump 3" => DriveSettings::watched(name),
+        _ => DriveSettings::controlled(name),
+    })
+    .await;
+    plant.machines[2].written_by_another(8_502, 250).unwrap();
+    plant
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_of_all_is_not_confirmed_while_a_motor_turns_that_is_only_watched() {
+    let test = one_is_watched().await;
+    let refused = |told: &CommandView| {
+        let several = told.several.as_ref().unwrap();
+        (told.outcome, several.confirmed, several.refused, several.drives[2].outcome)
+    };
+    for target in [Target::All, Target::Group("pumps".to_owned())] {
+        start_by_another(&test.machines[2]);
+        sleep(5 * SECOND).await;
+        let told = stop(&test.plant, target.clone()).await;
+        assert_eq!(refused(&told), (OutcomeWord::Refused, 2, 1, OutcomeWord::Refused), "{target:?}");
+        assert!(test.machines[2].observe().running, "it is not written to");
+        // Whoever commands it stops it. It stands, and needs no stop.
+        test.machines[2].written_by_another(8_501, 0x0007).unwrap();
+        sleep(20 * SECOND).await;
+        let told = stop(&test.plant, target.clone()).await;
+        assert_eq!(refused(&told), (OutcomeWord::Confirmed, 2, 1, OutcomeWord::Nothing), "{target:?}");
+        assert_eq!(told.several.as_ref().unwrap().drives[2].reason.as_deref(), Some("read_only"));
+    }
+    // And one of which nothing is known any more may turn.
+    test.machines[2].mute();
+    sleep(20 * SECOND).await;
+    assert_eq!(stop(&test.plant, Target::All).await.outcome, OutcomeWord::Refused);
+}
+
+#[tokio::test(start_paused = true)]
+async fn where_all_are_only_watched_and_stand_there_is_nothing_to_stop() {
+    let test = TestPlant::with(2, DriveSettings::watched).await;
+    let outcome = async || stop(&test.plant, Target::All).await.outcome;
+    assert_eq!(outcome().await, OutcomeWord::Nothing);
+    test.machines[0].written_by_another(8_502, 250).unwrap();
+    start_by_another(&test.machines[0]);
+    sleep(5 * SECOND).await;
+    assert_eq!(outcome().await, OutcomeWord::Refused);
+    let named = stop(&test.plant, Target::Drive("pump 2".to_owned())).await;
+    assert_eq!(named.outcome, OutcomeWord::Refused, "who names it is told that it is not stopped from here");
+}
