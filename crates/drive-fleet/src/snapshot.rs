@@ -201,6 +201,15 @@ pub struct PendingStop {
     pub alarm: bool,
 }
 
+impl PendingStop {
+    /// Whether a run command has come behind it since it was seen so before: the drive had taken it, and drives the motor again.
+    #[must_use]
+    pub fn is_undone_since(&self, before: &Self, motion: Motion) -> bool {
+        // Direct current that has brought it to rest is ended by another mode, and nobody has started it.
+        before.taken && !self.taken && before.mode == self.mode && motion == Motion::Driven
+    }
+}
+
 /// An output that is not at its setpoint, and comes no nearer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OffSetpoint {

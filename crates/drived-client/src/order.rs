@@ -25,6 +25,10 @@ const OUT_OF_SIGHT: Duration = Duration::from_secs(15);
 /// Between two words about a command that is not settled.
 const TOLD_EVERY: Duration = Duration::from_secs(5);
 
+/// Of a motor that was started again and again behind its stop.
+const RUNS_AGAIN: &str = "that came more than once, and the motor may run again: end it where it is given, such as at another master of the \
+                          line, or use the emergency stop";
+
 /// A command as the API takes it.
 #[derive(Debug, Clone)]
 pub struct Told {
@@ -59,6 +63,9 @@ pub async fn order(
     let mut left = Vec::new();
     for drive in &several.drives {
         match drive.outcome {
+            OutcomeWord::Confirmed if runs_again(drive) => {
+                left.push(format!("{}: {RUNS_AGAIN}", sentence(told, drive)));
+            }
             OutcomeWord::Confirmed if args.is_json() => {}
             OutcomeWord::Confirmed => output::done(output::say(sentence(told, drive)))?,
             // A stop of several asks nothing of those that are only read and stand.
@@ -83,6 +90,9 @@ pub async fn order(
 fn one(args: &DaemonArgs, told: &Told, command: &CommandView) -> Result<(), Failure> {
     let why = || format!("{}: {}", name(command), why(command));
     match command.outcome {
+        OutcomeWord::Confirmed if runs_again(command) => {
+            Err(Failure::Drive(format!("{}: {RUNS_AGAIN}", sentence(told, command))))
+        }
         OutcomeWord::Confirmed if args.is_json() => Ok(()),
         OutcomeWord::Confirmed => output::done(output::say(sentence(told, command))),
         // Who has no right has asked for the wrong thing.
@@ -91,6 +101,11 @@ fn one(args: &DaemonArgs, told: &Told, command: &CommandView) -> Result<(), Fail
         }
         _ => Err(Failure::Drive(why())),
     }
+}
+
+/// Whether somebody has started the motor behind its stop more than once: whoever does so by a cycle does so again.
+fn runs_again(command: &CommandView) -> bool {
+    command.restarts.is_some_and(|times| times > 1)
 }
 
 /// Follows a command until nothing is pending, and says what there is to say meanwhile.

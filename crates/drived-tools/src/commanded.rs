@@ -72,15 +72,13 @@ impl Course {
 
     fn look(&mut self, now: PendingStop, motion: Motion) -> impl Iterator<Item = News> + use<> {
         let before = self.last.replace(now);
-        let was = |is: fn(&PendingStop) -> bool| before.as_ref().is_some_and(is);
-        let was_taken = was(|stop| stop.taken);
-        // Direct current that has brought it to rest is ended by another mode, and nobody has started it.
-        let is_same = before.is_some_and(|before| before.mode == now.mode);
-        let restarted = was_taken && !now.taken && is_same && motion == Motion::Driven;
+        let was = |is: &dyn Fn(&PendingStop) -> bool| before.as_ref().is_some_and(is);
+        let was_taken = was(&|stop| stop.taken);
+        let restarted = was(&|before| now.is_undone_since(before, motion));
         self.restarts += u32::from(restarted);
         let news = [
             restarted.then_some(News::Restarted),
-            (now.alarm && !was(|stop| stop.alarm)).then_some(News::Alarm),
+            (now.alarm && !was(&|stop| stop.alarm)).then_some(News::Alarm),
             (now.taken && !was_taken).then_some(News::Taken),
         ];
         news.into_iter().flatten()

@@ -19,6 +19,7 @@ export const SENTENCES_FR = {
   'it has not been possible to check which drive it is': 'son identité n’a pas pu être contrôlée',
   'its communication watchdog is not verified': 'sa surveillance de communication n’est pas vérifiée',
   'a stop of it is not confirmed yet': 'un arrêt n’est pas encore confirmé',
+  'a run command of somebody else, or one kept back on its way, came behind it, and it was sent again': 'un ordre de marche de quelqu’un d’autre, ou retenu en chemin, est arrivé après lui, et il a été envoyé de nouveau',
   'a stop came before it was sent': 'un arrêt est arrivé avant son envoi',
   'a later command took its place before it was sent': 'un ordre ultérieur l’a remplacé avant son envoi',
   'it was withdrawn before it was sent': 'il a été retiré avant son envoi',

@@ -22,6 +22,7 @@ use super::{
     log::Command,
     outcome::{GROUP_BUSY, GROUP_FAILED, GROUP_NOT_READY, of_all, of_watched, told},
     settle::settled,
+    undone::{UNDONE, finished},
 };
 use crate::plant::{
     Plant,
@@ -95,6 +96,7 @@ impl Meant {
             counted: None,
             started: None,
             stop: None,
+            restarts: None,
             several: None,
         }
     }
@@ -253,10 +255,11 @@ impl Work {
 
     async fn work(&self, posted: Posted) {
         match posted {
-            Posted::Stop(stop) => self.end(0, &stop.await),
+            Posted::Stop(stop) => self.stopped(0, &stop).await,
             Posted::StopOfSeveral(stops) => {
                 let each = stops.each().iter();
-                join_all(each.map(async |(name, stop)| self.end_of(name, &stop.finished().await))).await;
+                let each = each.filter_map(|(name, stop)| Some((*self.0.numbers.get(name)?, stop)));
+                join_all(each.map(|(number, stop)| self.stopped(number, stop))).await;
             }
             Posted::SetpointOfSeveral(given) => {
                 for (name, outcome) in given.await {
@@ -277,6 +280,24 @@ impl Work {
                 self.start_group().await;
             }
         }
+    }
+
+    async fn stopped(&self, number: usize, stop: &StopTicket) {
+        let Some(member) = self.members().get(number) else { return };
+        let outcome = finished(stop, member, || self.undone(number)).await;
+        self.end(number, &outcome);
+    }
+
+    /// A run command has come behind a stop that goes on.
+    fn undone(&self, number: usize) {
+        if let Some(part) = self.parts().get_mut(number).map(Arc::make_mut) {
+            let times = part.restarts.unwrap_or(0) + 1;
+            (part.restarts, part.text) = (Some(times), Some(UNDONE.to_owned()));
+            if times == 1 {
+                tracing::warn!("{}: {}: {UNDONE}", part.drive.as_deref().unwrap_or_default(), part.command);
+            }
+        }
+        self.0.changed.notify_one();
     }
 
     async fn start_group(&self) {
@@ -399,6 +420,9 @@ impl CommandView {
             OutcomeWord::NotConfirmed => self.action == ActionWord::Stop,
             _ => false,
         };
+        let undone = self.restarts.map(|_| UNDONE.to_owned());
+        let text: Vec<String> = text.into_iter().chain(undone).collect();
+        let text = (!text.is_empty()).then(|| text.join("; "));
         Self { outcome, open, reason: reason.map(Cow::from), text, status, took_ms, ..self }
     }
 }

@@ -10,6 +10,7 @@ mod log;
 mod outcome;
 mod said;
 mod settle;
+mod undone;
 
 use std::{
     collections::HashMap,

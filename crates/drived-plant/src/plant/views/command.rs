@@ -54,6 +54,9 @@ pub struct CommandView {
     /// Of a stop that was sent: how it was asked for, and how the drive stops.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stop: Option<StopModesView>,
+    /// Of a stop: how often a run command of somebody else, or one kept back on its way, came behind it after the drive had taken it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub restarts: Option<u32>,
     #[serde(flatten)]
     pub several: Option<SeveralView>,
 }

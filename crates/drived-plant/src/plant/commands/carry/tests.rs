@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use drive_core::StopMode;
-use drive_fleet::DriveSettings;
+use drive_core::{Direction, Frequency, StopMode};
+use drive_fleet::{DriveSettings, Until};
 use drive_sim::SimSlave;
 
 use super::*;
@@ -14,6 +14,10 @@ const SECOND: Duration = Duration::from_secs(1);
 
 async fn stop(plant: &Plant, target: Target) -> Arc<CommandView> {
     let action = Action::Stop(StopMode::Ramp.into());
+    command(plant, target, action).await
+}
+
+async fn command(plant: &Plant, target: Target, action: Action) -> Arc<CommandView> {
     let (caller, arrived) = (Caller::new("page", "page", Rights::ALL), Instant::now());
     let request = Request { id: None, target, action, expects: None, lifetime: LIFETIME, arrived };
     plant.command(&caller, request, 40 * SECOND).await.unwrap()
@@ -74,4 +78,31 @@ async fn where_all_are_only_watched_and_stand_there_is_nothing_to_stop() {
     assert_eq!(outcome().await, OutcomeWord::Refused);
     let named = stop(&test.plant, Target::Drive("pump 2".to_owned())).await;
     assert_eq!(named.outcome, OutcomeWord::Refused, "who names it is told that it is not stopped from here");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_run_command_that_comes_behind_a_stop_is_told_and_stands_in_its_outcome() {
+    let mut test = TestPlant::of(2).await;
+    // What another master writes they do not follow.
+    drop(std::mem::take(&mut test.witnesses));
+    let setpoint = Some(Frequency::from_hertz(20).into());
+    let start = Action::Start { direction: Direction::Forward, setpoint, until: Until::AtReference };
+    for (target, times) in [(Target::Drive("pump 1".to_owned()), 1), (Target::All, 2)] {
+        let started = command(&test.plant, Target::Drive("pump 1".to_owned()), start).await;
+        assert_eq!(started.outcome, OutcomeWord::Confirmed);
+        let machine = test.machines[0].clone();
+        tokio::spawn(async move {
+            for _ in 0..times {
+                sleep(SECOND).await;
+                start_by_another(&machine);
+            }
+        });
+        let told = stop(&test.plant, target.clone()).await;
+        let told = told.several.as_ref().map_or(&told, |several| &several.drives[0]);
+        assert_eq!((told.outcome, told.restarts), (OutcomeWord::Confirmed, Some(times)), "{target:?}");
+        assert!(told.text.as_deref().is_some_and(|text| text.contains("a run command")), "{told:?}");
+        assert!(!test.machines[0].observe().running, "{target:?}");
+    }
+    let again = stop(&test.plant, Target::All).await;
+    assert_eq!(again.several.as_ref().unwrap().drives[0].restarts, None, "it is of that stop alone");
 }
