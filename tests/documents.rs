@@ -119,6 +119,20 @@ fn the_manual_lists_each_of_its_chapters_which_leads_back() {
 }
 
 #[test]
+fn every_event_of_a_drive_stands_in_the_manual() {
+    let read = |path: &str| fs::read_to_string(root().join(path)).expect("it is there");
+    let (source, manual) = (read("crates/drive-fleet/src/event.rs"), read("crates/drived/docs/daemon.md"));
+    let names = source.split("pub const fn name(&self)").nth(1).expect("each has a name");
+    let names = names.split("    }\n").next().expect("one after the other");
+    let names = names.split("=> \"").skip(1).filter_map(|rest| rest.split('"').next());
+    let missing: Vec<String> = names
+        .map(|name| name.replace(' ', "_"))
+        .filter(|name| !manual.contains(&format!("`{name}`")))
+        .collect();
+    assert_eq!(missing, [""; 0], "they are told, and the manual does not know them");
+}
+
+#[test]
 fn every_file_that_a_document_names_is_there() {
     let root = root();
     let tops = ["crates/", "tests/", "examples/", ".github/", ".ci/"];

@@ -74,8 +74,10 @@ settings! {
         |to, said| to.settings.watchdog =
             Some(WatchdogContract { timeout: said.time.0.0, reaction: said.reaction.0.0 }),
         tells "watchdog" told::watchdog;
-    /// `{ low = 20, high = 48.5, forbidden = [[30, 32]], change_per_second = 2 }`: setpoints outside are refused; an output
-    /// more than 5 % above `high`, whoever has given it, is an alarm (`limit_exceeded`)
+    /// `{ low = 20, high = 48.5, forbidden = [[30, 32]], change_per_second = 2 }`: setpoints outside or within a forbidden band,
+    /// whose edges are allowed, are refused, and while the motor turns those that are further from the last one than
+    /// `change_per_second` hertz for each second since; an output more than 5 % above `high`, whoever has given it, is an alarm
+    /// (`limit_exceeded`)
     frequency: FrequencyEntry = "the drive's own limits",
         acts(_),
         |to, said| to.settings.limits = said.limits(),
