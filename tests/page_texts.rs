@@ -92,6 +92,7 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
         Refused::Superseded,
         Refused::Withdrawn,
         Refused::QueueFull,
+        Refused::Removed,
         Refused::ShutDown,
         Refused::Limit(LimitProblem::NotInHertz),
         Refused::Limit(LimitProblem::UnknownSetpoint),

@@ -535,6 +535,7 @@ fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
         calls: Arc::default(),
         snapshots: snapshot.into(),
         exit: exited,
+        removed: Arc::default(),
     })
 }
 

@@ -5,7 +5,7 @@ use std::{
     pin::pin,
     sync::{
         Arc, LazyLock, PoisonError, RwLock,
-        atomic::{AtomicU64, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
     time::Duration,
 };
@@ -55,6 +55,8 @@ pub(crate) struct Entry {
     pub(crate) calls: Arc<AtomicU64>,
     pub(crate) snapshots: Latest<Arc<Snapshot>>,
     pub(crate) exit: watch::Receiver<Option<(ExitAction, Left)>>,
+    /// It was removed from a fleet that goes on.
+    pub(crate) removed: Arc<AtomicBool>,
 }
 
 impl Entry {
@@ -65,6 +67,11 @@ impl Entry {
     /// What was done to it at its end, once it is.
     pub(crate) fn exit_action(&self) -> ExitAction {
         self.exit.borrow().as_ref().map_or(ExitAction::TimeOver, |(action, _)| action.clone())
+    }
+
+    /// Why nothing is asked of it any more, whose task is gone.
+    fn gone(&self) -> Refused {
+        if self.removed.load(Ordering::Relaxed) { Refused::Removed } else { Refused::ShutDown }
     }
 
     fn new_call(&self) -> CallId {
@@ -272,7 +279,7 @@ impl DriveHandle {
         let (reply, answer) = oneshot::channel();
         let name = Arc::clone(&self.act.commander);
         self.post(Message::Ask { name, direction, setpoint, reply })?;
-        answer.await.unwrap_or(Err(Refused::ShutDown))
+        answer.await.unwrap_or_else(|_| Err(self.entry.gone()))
     }
 
     /// Starts the motor at the setpoint that the drive holds. Confirmed when the run command shows in its words.
@@ -321,9 +328,10 @@ impl DriveHandle {
     ) -> StopTicket {
         let (reply, hearer) = watch::channel(Progress::default());
         let (id, act) = (self.entry.new_call(), Arc::clone(&self.act));
-        // One that cannot be given any more is refused by the end of its reply.
-        let _ = self.entry.urgent.send(Urgent::Stop { id, order, act, patience, round, reply });
-        StopTicket::new(hearer)
+        match self.entry.urgent.send(Urgent::Stop { id, order, act, patience, round, reply }) {
+            Ok(()) => StopTicket::new(hearer),
+            Err(_) => StopTicket::new(refused(self.entry.gone())),
+        }
     }
 
     /// Resets the present fault, once. The motor does not start.
@@ -425,7 +433,7 @@ impl DriveHandle {
     fn post(&self, message: Message) -> Result<(), Refused> {
         self.entry.messages.try_send(message).map_err(|error| match error {
             mpsc::error::TrySendError::Full(_) => Refused::QueueFull,
-            mpsc::error::TrySendError::Closed(_) => Refused::ShutDown,
+            mpsc::error::TrySendError::Closed(_) => self.entry.gone(),
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeSet,
-    sync::{Arc, PoisonError},
+    sync::{Arc, PoisonError, atomic::Ordering},
     time::Duration,
 };
 
@@ -101,6 +101,7 @@ impl Fleet {
             calls: Arc::clone(&entry.calls),
             snapshots: snapshots.into(),
             exit: entry.exit.clone(),
+            removed: Arc::clone(&entry.removed),
         });
         *entry.settings.write().unwrap_or_else(PoisonError::into_inner) = Arc::clone(&settings);
         self.change(|members| members.rename(old, renamed));
@@ -124,6 +125,7 @@ impl Fleet {
         limit: Duration,
     ) -> impl Future<Output = Vec<(Arc<str>, ExitAction)>> + Send + use<> {
         let leaving = self.members().numbered(drives);
+        leaving.values().for_each(|entry| entry.removed.store(true, Ordering::Relaxed));
         let (ended, fleet) = (end(leaving.values().cloned().collect(), Policy::Removal, limit), self.clone());
         async move {
             let actions = ended.await;

@@ -565,6 +565,8 @@ pub enum Refused {
     Drive(Error),
     /// Too many commands for this drive wait.
     QueueFull,
+    /// The drive was removed from the fleet, or is about to be, and the fleet goes on.
+    Removed,
     /// The fleet has shut down.
     ShutDown,
 }
@@ -592,6 +594,7 @@ impl Refused {
             Self::Drive(Error::Port { .. }) => "no_answer",
             Self::Drive(_) => "drive",
             Self::QueueFull => "queue_full",
+            Self::Removed => "removed",
             Self::ShutDown => "shut_down",
         }
     }
@@ -629,6 +632,7 @@ impl fmt::Display for Refused {
             Self::Limit(problem) => problem.fmt(f),
             Self::Drive(error) => error.fmt(f),
             Self::QueueFull => f.write_str("too many commands for this drive wait"),
+            Self::Removed => f.write_str("the drive was removed from the fleet"),
             Self::ShutDown => f.write_str("the fleet has shut down"),
         }
     }

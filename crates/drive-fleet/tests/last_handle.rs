@@ -154,3 +154,21 @@ async fn without_a_stop_the_last_handle_ends_it_all_and_the_motor_runs_on() {
     assert_eq!(machine.requests(0x06) + machine.requests(0x10), before);
     assert!(machine.observe().running);
 }
+
+/// The fleet goes on: only this drive is not of it any more.
+#[tokio::test(start_paused = true)]
+async fn a_drive_that_was_removed_from_a_fleet_that_runs_refuses_for_that() {
+    let (fleet, pump, machine, _site) = running().await;
+    let removing = fleet.remove(&["pump 1"], LONG);
+    sleep(Duration::from_millis(100)).await;
+    let during = pump.start(Direction::Forward).await;
+    removing.await;
+    let (start, stop) = (pump.start(Direction::Forward).await, pump.stop(StopMode::Ramp).await);
+    for outcome in [during, start, stop] {
+        assert_eq!(outcome, Outcome::Refused(Refused::Removed));
+        assert_eq!(outcome.reason(), Some("removed"));
+    }
+    assert_eq!(pump.faults().await, Err(Refused::Removed));
+    assert!(!machine.observe().running, "its policy has acted");
+    assert!(fleet.extend(|fleet| fleet).is_ok(), "the fleet has not shut down");
+}

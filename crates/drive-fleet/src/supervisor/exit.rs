@@ -7,7 +7,7 @@ use super::{Asker, Job, Supervisor, stopping::Stopping};
 use crate::{
     cause::{Cause, Policy},
     event::{EventKind, ExitAction},
-    outcome::{Order, Outcome},
+    outcome::{Order, Outcome, Refused},
     settings::{Left, OnExit, OnExitAdopted, OnExitWatchdog, RunRecord},
     snapshot::Link,
 };
@@ -258,6 +258,14 @@ impl Supervisor {
     fn watchdog_stays(&mut self, why: &'static str) {
         if let Some(timeout) = self.checks.set_to() {
             self.emit_by(EventKind::WatchdogStays { timeout, why }, Cause::policy(self.exits_by));
+        }
+    }
+
+    /// Why nothing is begun any more of a drive that ends.
+    pub(super) const fn gone(&self) -> Refused {
+        match self.exits_by {
+            Policy::Removal => Refused::Removed,
+            _ => Refused::ShutDown,
         }
     }
 

@@ -339,8 +339,9 @@ impl Supervisor {
     }
 
     pub(super) fn refuse_queue(&mut self) {
-        self.end_queue(&Refused::ShutDown);
-        self.end_questions(&Refused::ShutDown);
+        let gone = self.gone();
+        self.end_queue(&gone);
+        self.end_questions(&gone);
     }
 
     fn end_active(&mut self, unsent: Refused, sent: Unconfirmed) {

@@ -94,7 +94,7 @@ impl Supervisor {
             return Some(Refused::ReadOnly);
         }
         if self.is_exiting() {
-            return Some(Refused::ShutDown);
+            return Some(self.gone());
         }
         if let Some(name) = name.filter(|name| !self.settings.commanders.allow(name)) {
             return Some(Refused::Commander(name.to_owned()));

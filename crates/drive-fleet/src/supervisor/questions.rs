@@ -60,7 +60,7 @@ impl Supervisor {
             }
         }
         if self.is_exiting() {
-            return Some(Refused::ShutDown);
+            return Some(self.gone());
         }
         if self.link != Link::Connected {
             return Some(Refused::NotConnected);

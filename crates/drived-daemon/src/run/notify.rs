@@ -197,7 +197,7 @@ impl Pulse {
             match refused {
                 // It was not asked: once more at the next look.
                 Some(Refused::QueueFull) => drop(seen.remove(drive.name())),
-                Some(Refused::ShutDown) => {}
+                Some(Refused::Removed | Refused::ShutDown) => {}
                 _ => drop(seen.insert(Arc::clone(drive.name()), true)),
             }
         });

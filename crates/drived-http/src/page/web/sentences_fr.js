@@ -25,6 +25,7 @@ export const SENTENCES_FR = {
   'it was withdrawn before it was sent': 'il a été retiré avant son envoi',
   'too many commands for this drive wait': 'trop d’ordres attendent pour ce variateur',
   'the daemon is about to end: until it has, only stops are carried out': 'le service est sur le point de s’arrêter : d’ici là, seuls les arrêts sont exécutés',
+  'the drive was removed from the fleet': 'le variateur a été retiré de la configuration',
   'the fleet has shut down': 'le service est arrêté',
   'no run command of this side stood any more': 'aucun ordre de marche de ce côté n’était plus donné',
   'its time was over': 'son délai est passé',

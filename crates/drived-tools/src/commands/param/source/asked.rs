@@ -127,7 +127,7 @@ fn is_of_the_register(reason: Option<&str>) -> bool {
 
 /// Whether the daemon refuses whatever is asked of this drive, now or of this caller, and not this register: its words for that.
 fn is_of_the_moment(reason: &str) -> bool {
-    const WHATEVER: [&str; 12] = [
+    const WHATEVER: [&str; 13] = [
         "read_only",
         "no_right",
         "offline",
@@ -139,6 +139,7 @@ fn is_of_the_moment(reason: &str) -> bool {
         "stop",
         "later_command",
         "queue_full",
+        "removed",
         "shut_down",
     ];
     reason == Refusal::MotorRunning.word() || WHATEVER.contains(&reason)
