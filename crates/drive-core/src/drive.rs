@@ -206,7 +206,7 @@ pub trait Drive: Send {
     }
 
     /// Stops the motor, whatever is known of the drive and whatever its settings are: **it never ends without a stop on
-    /// the wire**. A mode that the family, or the drive as it is set up, does not have is replaced: by the stop that the
+    /// the wire**, but where the port leads to another slave than the drive was made for. A mode that the family, or the drive as it is set up, does not have is replaced: by the stop that the
     /// drive's own settings select when the run command goes, provided that it acts; else by a fast stop; else by
     /// freewheel. DC injection is never a substitute. [`Stopped`] says which mode was used. Returns when the drive shows
     /// that no run command is in force any more; the motor may still be coming down.
@@ -221,6 +221,7 @@ pub trait Drive: Send {
     /// # Errors
     /// [`Error::NotConfirmed`] when the stop does not show, with what keeps the motor turning where the drive tells it:
     /// repeat it, or stop the motor where it is commanded from. Never [`Error::Unsupported`] or [`Error::Refused`].
+    /// [`Error::OtherSlave`] when its port leads to another slave: nothing was sent, and no other drive is stopped in its place.
     async fn stop(&mut self, mode: StopMode) -> Result<Stopped>;
 
     /// Ends the run command that this side has given, and nothing else: no fast stop, no freewheel, no injection and no

@@ -15,5 +15,10 @@ pub use drive_fleet::{
 #[cfg(feature = "sim")]
 pub use drive_sim as sim;
 
-#[doc = include_str!("../COOKBOOK.md")]
+// Most of its recipes have a simulated drive: without the feature they are neither shown nor tried.
+#[cfg_attr(feature = "sim", doc = include_str!("../COOKBOOK.md"))]
+#[cfg_attr(
+    not(feature = "sim"),
+    doc = "Recipes, in `COOKBOOK.md` of the crate: those with a simulated drive need the feature `sim`."
+)]
 pub mod cookbook {}
