@@ -1,6 +1,6 @@
 //! One client: its frames come in, its answers go out. It may be slow, idle or hostile; nobody else notices.
 
-use std::{net::IpAddr, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use bytes::Bytes;
 use drive_bus::exchange::mbap;
@@ -12,6 +12,7 @@ use tokio::{
 };
 
 use super::{
+    clients::Connection,
     counters::Ended,
     desk::{Asked, Desk},
     framing::{Frame, Frames},
@@ -38,16 +39,17 @@ struct Waiting {
 /// Serves a client until it goes, or has to.
 pub(super) async fn serve(
     stream: impl AsyncRead + AsyncWrite + Send,
-    peer: IpAddr,
+    by: Connection,
     desk: Arc<Desk>,
     place: &Place,
 ) {
+    let by = Arc::new(by);
     let (input, output) = tokio::io::split(stream);
     let (answers, outbox) = mpsc::channel(UNREAD);
     let (queue, waiting) = mpsc::channel(QUEUED);
     let mut written = std::pin::pin!(write(output, outbox));
-    let mut carried = std::pin::pin!(carry_out(&desk, peer, waiting, answers.clone()));
-    let read = read(input, &desk, (peer, place), queue, answers);
+    let mut carried = std::pin::pin!(carry_out(&desk, &by, waiting, answers.clone()));
+    let read = read(input, &desk, (&by, place), queue, answers);
     let (ended, takes_more) = tokio::select! {
         ended = read => (ended, true),
         // Whoever takes no answer any more asks nothing more.
@@ -57,7 +59,7 @@ pub(super) async fn serve(
     if let Some(why) = ended {
         let count = desk.counters.end(why);
         if count.is_power_of_two() {
-            let name = &desk.config.name;
+            let (name, peer) = (&desk.config.name, by.peer);
             tracing::warn!("gateway {name}: {peer} was put out ({}), {count} of these in all", why.name());
         }
     }
@@ -73,7 +75,7 @@ pub(super) async fn serve(
 async fn read(
     mut input: impl AsyncRead + Unpin,
     desk: &Arc<Desk>,
-    (peer, place): (IpAddr, &Place),
+    (by, place): (&Arc<Connection>, &Place),
     queue: mpsc::Sender<Waiting>,
     answers: mpsc::Sender<Bytes>,
 ) -> Option<Ended> {
@@ -96,17 +98,17 @@ async fn read(
                 Ok(None) => break,
                 Err(_) => return Some(Ended::Malformed),
             };
-            desk.clients.hear(peer, arrived);
-            desk.plant.watched().hear(&desk.config.name, peer, arrived);
+            desk.clients.hear(by.peer, arrived);
+            desk.plant.watched().hear(&desk.config.name, by.peer, arrived);
             place.hear(arrived);
             let Frame { transaction, unit, .. } = frame;
             let asked = desk.look_at(arrived, &frame);
             if asked.stop.is_some() {
-                let (desk, answers) = (Arc::clone(desk), answers.clone());
+                let (desk, by, answers) = (Arc::clone(desk), Arc::clone(by), answers.clone());
                 // It is closed by nobody.
                 let place = Arc::clone(&stops).acquire_owned().await;
                 let stopped = async move {
-                    answer(&desk, peer, Waiting { transaction, unit, asked }, &answers).await;
+                    answer(&desk, &by, Waiting { transaction, unit, asked }, &answers).await;
                     drop(place);
                 };
                 tokio::spawn(stopped);
@@ -131,18 +133,18 @@ async fn read(
 /// Carries out one request after the other.
 async fn carry_out(
     desk: &Arc<Desk>,
-    peer: IpAddr,
+    by: &Connection,
     mut waiting: mpsc::Receiver<Waiting>,
     answers: mpsc::Sender<Bytes>,
 ) {
     while let Some(next) = waiting.recv().await {
-        answer(desk, peer, next, &answers).await;
+        answer(desk, by, next, &answers).await;
     }
 }
 
-async fn answer(desk: &Arc<Desk>, peer: IpAddr, waiting: Waiting, answers: &mpsc::Sender<Bytes>) {
+async fn answer(desk: &Arc<Desk>, by: &Connection, waiting: Waiting, answers: &mpsc::Sender<Bytes>) {
     let Waiting { transaction, unit, asked } = waiting;
-    if let Some(pdu) = desk.answer(peer, asked).await {
+    if let Some(pdu) = desk.answer(by, asked).await {
         // Nobody waits for the answer of a client that is gone.
         let _ = answers.send(mbap::frame(transaction, unit, &pdu)).await;
     }

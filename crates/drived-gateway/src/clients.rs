@@ -1,10 +1,10 @@
-//! What is remembered of clients by their addresses: the last command word to each drive, and when they were last heard. Time is an
-//! argument.
+//! What is remembered of clients: by their addresses the last command word to each drive, and when they were last heard; by their
+//! connections what is older than what.
 
 use std::{
     collections::HashMap,
     net::IpAddr,
-    sync::{Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 use drive_fleet::Place;
@@ -15,14 +15,57 @@ const KEPT: usize = 1_024;
 
 /// A command word, as far as it matters for the next one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Word {
+enum Word {
     Run,
     WithoutRun,
 }
 
+/// What stands before a run command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Before {
+    /// A word without run of the same client, written then.
+    WithoutRun(Instant),
+    /// Nothing, or a run command: it only goes on.
+    NoWordWithoutRun,
+    /// A word without run that came on another connection when this one was open already. A kernel sends again what it has no answer
+    /// to, also when its program has closed the connection and gone on by another one: the run command may be from before that word.
+    NewerConnection,
+}
+
+/// A connection of a client.
+#[derive(Debug)]
+pub(super) struct Connection {
+    pub(super) peer: IpAddr,
+    opened: Moment,
+}
+
+/// One after the other, of all gateways of a program.
+type Moment = u64;
+
+/// In which order connections were opened and words without run written, at all gateways of a program. Cheap to clone.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Course(Arc<Mutex<Past>>);
+
+#[derive(Debug, Default)]
+struct Past {
+    moments: Moment,
+    /// The last word without run to each drive: when, and when its connection was opened, which no two were at once.
+    without_run: HashMap<Place, (Moment, Moment)>,
+}
+
+impl Past {
+    const fn next(&mut self) -> Moment {
+        self.moments += 1;
+        self.moments
+    }
+}
+
 /// The clients of a gateway.
 #[derive(Debug, Default)]
-pub(super) struct Clients(Mutex<HashMap<IpAddr, Client>>);
+pub(super) struct Clients {
+    addresses: Mutex<HashMap<IpAddr, Client>>,
+    course: Course,
+}
 
 #[derive(Debug)]
 struct Client {
@@ -31,19 +74,50 @@ struct Client {
 }
 
 impl Clients {
+    /// Those of one of the gateways that have a course together.
+    pub(super) fn of(course: Course) -> Self {
+        Self { course, ..Self::default() }
+    }
+
+    /// A client has opened a connection.
+    pub(super) fn open(&self, peer: IpAddr) -> Connection {
+        Connection { peer, opened: lock(&self.course.0).next() }
+    }
+
     /// A client has asked for something.
     pub(super) fn hear(&self, peer: IpAddr, now: Instant) {
         self.with(peer, now, |client| client.heard = now);
     }
 
-    /// A client has written a command word to a drive; gives the one before it, and when that was.
-    pub(super) fn write(&self, peer: IpAddr, drive: &Place, word: Word) -> Option<(Word, Instant)> {
+    /// A client has written a word without run to a drive.
+    pub(super) fn write_without_run(&self, by: &Connection, drive: &Place) {
+        let mut past = lock(&self.course.0);
+        let written = (past.next(), by.opened);
+        past.without_run.insert(drive.clone(), written);
+        drop(past);
+        self.write(by.peer, drive, Word::WithoutRun);
+    }
+
+    /// A client has written a run command to a drive; gives what stands before it. What may be old is not his last word.
+    pub(super) fn write_run(&self, by: &Connection, drive: &Place) -> Before {
+        let last = lock(&self.course.0).without_run.get(drive).copied();
+        if last.is_some_and(|(at, connection)| at > by.opened && connection != by.opened) {
+            return Before::NewerConnection;
+        }
+        match self.write(by.peer, drive, Word::Run) {
+            Some((Word::WithoutRun, at)) => Before::WithoutRun(at),
+            _ => Before::NoWordWithoutRun,
+        }
+    }
+
+    /// Keeps a word; gives the one before it, and when that was.
+    fn write(&self, peer: IpAddr, drive: &Place, word: Word) -> Option<(Word, Instant)> {
         let now = Instant::now();
         self.with(peer, now, |client| client.words.insert(drive.clone(), (word, now)))
     }
 
     fn with<T>(&self, peer: IpAddr, now: Instant, act: impl FnOnce(&mut Client) -> T) -> T {
-        let mut clients = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut clients = lock(&self.addresses);
         if clients.len() >= KEPT && !clients.contains_key(&peer) {
             let oldest = clients.iter().min_by_key(|(_, client)| client.heard).map(|(peer, _)| *peer);
             if let Some(oldest) = oldest {
@@ -53,4 +127,8 @@ impl Clients {
         let new = || Client { heard: now, words: HashMap::new() };
         act(clients.entry(peer).or_insert_with(new))
     }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

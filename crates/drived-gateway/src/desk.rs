@@ -4,7 +4,6 @@ mod writes;
 
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap},
-    net::IpAddr,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
@@ -25,7 +24,7 @@ use tokio::{
 
 pub(crate) use self::writes::{Stop, watched};
 use super::{
-    clients::Clients,
+    clients::{Clients, Connection, Course},
     counters::{Counters, Result as Counted},
     framing::Frame,
     kept::Kept,
@@ -139,18 +138,25 @@ pub(super) struct Desk {
 }
 
 impl Desk {
-    pub(super) fn new(config: GatewayConfig, plant: Plant, audit: Audit, names: Names) -> Arc<Self> {
-        let (counters, clients, kept, outcomes, turns, under_way) = Default::default();
+    pub(super) fn new(
+        course: &Course,
+        config: GatewayConfig,
+        plant: Plant,
+        audit: Audit,
+        names: Names,
+    ) -> Arc<Self> {
+        let clients = Clients::of(course.clone());
+        let (counters, kept, outcomes, turns, under_way) = Default::default();
         Arc::new(Self { config, counters, plant, audit, names, clients, kept, outcomes, turns, under_way })
     }
 
     /// The PDU that answers a request; `None`: silence.
-    pub(super) async fn answer(self: &Arc<Self>, peer: IpAddr, asked: Asked) -> Option<Vec<u8>> {
+    pub(super) async fn answer(self: &Arc<Self>, by: &Connection, asked: Asked) -> Option<Vec<u8>> {
         let Asked { arrived, unit, function, ask, stop, written } = asked;
         let answer = match ask {
             Err(code) if self.config.virtual_unit == Some(unit) => Err(code),
             Err(code) => self.drive(unit).ok_or(ExceptionCode::GatewayPathUnavailable).and(Err(code)),
-            Ok(ask @ Ask::Write { .. }) => self.write(peer, arrived, unit, &ask, stop, written).await,
+            Ok(ask @ Ask::Write { .. }) => self.write(by, arrived, unit, &ask, stop, written).await,
             Ok(ask) => self.look_up(arrived, unit, ask).await,
         };
         let (counted, pdu) = match answer {

@@ -35,7 +35,7 @@ use tokio::{
 };
 
 pub use self::face::{All, FACE};
-use self::{config::GatewayConfig, counters::Ended, desk::Desk};
+use self::{clients::Course, config::GatewayConfig, counters::Ended, desk::Desk};
 use drived_doors::{
     TRIED_AGAIN,
     crowd::{Crowd, Limits},
@@ -57,8 +57,10 @@ impl Gateways {
     fn open(gateways: &[GatewayConfig], around: &Surroundings) -> Self {
         let (end, ended) = watch::channel(false);
         let Surroundings { plant, audit, names, .. } = around;
-        let desk =
-            |config: &GatewayConfig| Desk::new(config.clone(), plant.clone(), audit.clone(), names.clone());
+        let course = Course::default();
+        let desk = |config: &GatewayConfig| {
+            Desk::new(&course, config.clone(), plant.clone(), audit.clone(), names.clone())
+        };
         let desks: Vec<_> = gateways.iter().map(desk).collect();
         // Before anybody is heard by one of them.
         plant.watched().set_doors(&gateways.iter().map(desk::watched).collect::<Vec<_>>());
@@ -121,11 +123,12 @@ async fn accept_all(listener: &TcpListener, desk: &Arc<Desk>, mut ended: watch::
             }
         };
         hurry(&stream);
+        let by = desk.clients.open(peer);
         let (desk, mut ended) = (Arc::clone(desk), ended.clone());
         tokio::spawn(async move {
             let _present = desk.counters.enter();
             tokio::select! {
-                () = client::serve(stream, peer, Arc::clone(&desk), &place) => {}
+                () = client::serve(stream, by, Arc::clone(&desk), &place) => {}
                 // Somebody who speaks needs the place of one who does not.
                 () = place.wanted() => drop(desk.counters.end(Ended::Idle)),
                 _ = ended.changed() => {}

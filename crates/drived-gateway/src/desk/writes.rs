@@ -1,7 +1,5 @@
 //! Writes: judged as commands of the fleet are, carried out by it, and confirmed once they are in force.
 
-use std::net::IpAddr;
-
 use drive_core::{
     Class, Direction, Drive, Error, Intent, Row, Setpoint, StopMode, Terms, tokio_modbus::ExceptionCode,
 };
@@ -11,7 +9,11 @@ use futures_util::{FutureExt as _, future::join_all};
 use tokio::time::{Instant, timeout_at};
 
 use super::{Answer, Desk};
-use crate::{clients::Word, config::GatewayConfig, pdu::Ask};
+use crate::{
+    clients::{Before, Connection},
+    config::GatewayConfig,
+    pdu::Ask,
+};
 use drived_doors::{
     Caller,
     audit::{Kind, Record},
@@ -45,6 +47,13 @@ impl Refusal {
 struct Wanted {
     command: Option<Intent>,
     setpoint: Option<Setpoint>,
+}
+
+/// Who writes: on which connection, and as whom the plant knows him.
+#[derive(Clone, Copy)]
+struct Who<'a> {
+    by: &'a Connection,
+    caller: &'a Caller,
 }
 
 /// A stop that waits for nothing, by this mode.
@@ -88,7 +97,7 @@ impl Desk {
     /// Carries out a write.
     pub(crate) async fn write(
         &self,
-        peer: IpAddr,
+        by: &Connection,
         arrived: Instant,
         unit: u8,
         ask: &Ask,
@@ -101,23 +110,23 @@ impl Desk {
         if drives.is_empty() && (unit != 0 || !self.config.broadcast) {
             return Err(ExceptionCode::GatewayPathUnavailable);
         }
-        let caller = self.caller(peer);
+        let caller = self.caller(by);
+        let who = Who { by, caller: &caller };
         drives.iter().for_each(|drive| self.kept.forget(drive.place()));
         let written = match (stop, &drives[..]) {
             (Some(stop), [drive]) => {
-                let stopped = self.stop_as_asked((peer, &caller), drive, stop, ask, arrived).await;
+                let stopped = self.stop_as_asked(who, drive, stop, ask, arrived).await;
                 match stopped {
-                    Ok(()) => self.setpoint_beside(&caller, drive, ask, arrived).await,
+                    Ok(()) => self.setpoint_beside(who, drive, ask, arrived).await,
                     refused => refused,
                 }
             }
             (Some(stop), drives) => {
-                let stops =
-                    drives.iter().map(|drive| self.stop_as_asked((peer, &caller), drive, stop, ask, arrived));
+                let stops = drives.iter().map(|drive| self.stop_as_asked(who, drive, stop, ask, arrived));
                 join_all(stops).await.into_iter().collect()
             }
             (None, [drive]) if unit != 0 || self.drive(0).is_some() => {
-                self.command(peer, &caller, drive, ask, arrived).await
+                self.command(who, drive, ask, arrived).await
             }
             (None, _) => Err(Refusal::rule("to all units at once only a stop is carried out")),
         };
@@ -132,26 +141,26 @@ impl Desk {
     /// once the drive has shown it.
     async fn stop_as_asked(
         &self,
-        (peer, caller): (IpAddr, &Caller),
+        who: Who<'_>,
         drive: &DriveHandle,
         Stop(mode): Stop,
         ask: &Ask,
         arrived: Instant,
     ) -> Result<(), Refusal> {
-        self.clients.write(peer, drive.place(), Word::WithoutRun);
+        self.clients.write_without_run(who.by, drive.place());
         let asked: Vec<Intent> = self.intents_without_reading(drive, ask).collect();
         if asked.contains(&Intent::QuickStop) {
             self.plant.quick_stops().lock(drive);
         }
-        self.stop(caller, drive, mode, arrived).await?;
+        self.stop(who.caller, drive, mode, arrived).await?;
         if asked.iter().any(|intent| disables_voltage(*intent)) && !asked.contains(&Intent::QuickStop) {
             self.plant.quick_stops().unlock(drive);
         }
         Ok(())
     }
 
-    fn caller(&self, peer: IpAddr) -> Caller {
-        Caller::new(self.config.name.clone(), format!("modbus {peer}"), self.config.rights)
+    fn caller(&self, by: &Connection) -> Caller {
+        Caller::new(self.config.name.clone(), format!("modbus {}", by.peer), self.config.rights)
     }
 
     /// What each word of a write asks, as far as that needs no exchange.
@@ -221,7 +230,7 @@ impl Desk {
     /// The setpoint that was written together with a stop.
     async fn setpoint_beside(
         &self,
-        caller: &Caller,
+        who: Who<'_>,
         drive: &DriveHandle,
         ask: &Ask,
         arrived: Instant,
@@ -234,7 +243,7 @@ impl Desk {
         match wanted.and_then(|wanted| wanted.setpoint) {
             Some(setpoint) if drive.snapshot().setpoint != Some(setpoint) => {
                 let action = Action::Setpoint { setpoint, until: Until::InForce };
-                let given = self.order(caller, drive, action, arrived, deadline).await;
+                let given = self.order(who, drive, action, arrived, deadline).await;
                 given.map_err(|Refusal { code, why }| {
                     Refusal::new(code, format!("it stops; its setpoint: {why}"))
                 })
@@ -285,8 +294,7 @@ impl Desk {
     /// Carries out a write that is no stop.
     async fn command(
         &self,
-        peer: IpAddr,
-        caller: &Caller,
+        who: Who<'_>,
         drive: &DriveHandle,
         ask: &Ask,
         arrived: Instant,
@@ -300,35 +308,35 @@ impl Desk {
         let deadline = arrived + self.config.patience;
         let wanted = timeout_at(deadline, self.wanted(drive, ask)).await.map_err(|_| busy())??;
         let Some(Wanted { command, setpoint }) = wanted else {
-            return self.parameters(caller, drive, ask, deadline).await;
+            return self.parameters(who, drive, ask, deadline).await;
         };
         let give = |setpoint| Action::Setpoint { setpoint, until: Until::InForce };
         match command {
             None => match setpoint {
-                Some(setpoint) => self.order(caller, drive, give(setpoint), arrived, deadline).await,
+                Some(setpoint) => self.order(who, drive, give(setpoint), arrived, deadline).await,
                 None => Ok(()),
             },
             Some(Intent::Start(direction)) => {
                 let action = Action::Start { direction, setpoint, until: Until::InForce };
-                self.start(peer, caller, drive, (direction, setpoint), action, (arrived, deadline)).await
+                self.start(who, drive, (direction, setpoint), action, (arrived, deadline)).await
             }
             Some(Intent::ResetFaults(_)) if shows_fault(drive) => {
-                self.clients.write(peer, drive.place(), Word::WithoutRun);
-                self.order(caller, drive, Action::Reset, arrived, deadline).await?;
+                self.may_begin()?;
+                self.clients.write_without_run(who.by, drive.place());
+                self.order(who, drive, Action::Reset, arrived, deadline).await?;
                 self.plant.quick_stops().unlock(drive);
                 Ok(())
             }
             Some(step) => {
-                self.clients.write(peer, drive.place(), Word::WithoutRun);
                 match self.stops_by(drive, step).filter(|_| !stands(drive)) {
                     // It was started while this waited.
                     Some(mode) => {
-                        self.stop_as_asked((peer, caller), drive, Stop(mode), ask, arrived).await?;
+                        self.stop_as_asked(who, drive, Stop(mode), ask, arrived).await?;
                     }
-                    None => self.prepare(drive, ask, arrived).await?,
+                    None => self.prepare(who, drive, ask, arrived).await?,
                 }
                 match setpoint.filter(|setpoint| drive.snapshot().setpoint != Some(*setpoint)) {
-                    Some(setpoint) => self.order(caller, drive, give(setpoint), arrived, deadline).await,
+                    Some(setpoint) => self.order(who, drive, give(setpoint), arrived, deadline).await,
                     None => Ok(()),
                 }
             }
@@ -339,8 +347,7 @@ impl Desk {
     /// meanwhile, tripped or never started, a word without run has to come first from this client.
     async fn start(
         &self,
-        peer: IpAddr,
-        caller: &Caller,
+        who: Who<'_>,
         drive: &DriveHandle,
         (direction, setpoint): (Direction, Option<Setpoint>),
         action: Action,
@@ -348,7 +355,7 @@ impl Desk {
     ) -> Result<(), Refusal> {
         // Also whoever is heard for a motor that runs stays who he is.
         self.may_begin()?;
-        let before = self.clients.write(peer, drive.place(), Word::Run);
+        let before = self.clients.write_run(who.by, drive.place());
         let snapshot = drive.snapshot();
         let status = snapshot.fresh_status(Instant::now());
         let ours = status.and_then(|status| status.verdict).is_some_and(|verdict| verdict.is_in_force());
@@ -358,7 +365,7 @@ impl Desk {
             return match setpoint.filter(|setpoint| snapshot.setpoint != Some(*setpoint)) {
                 Some(setpoint) => {
                     let action = Action::Setpoint { setpoint, until: Until::InForce };
-                    self.order(caller, drive, action, arrived, deadline).await
+                    self.order(who, drive, action, arrived, deadline).await
                 }
                 None => Ok(()),
             };
@@ -370,16 +377,21 @@ impl Desk {
         }
         // What was wished before a stop of somebody else is not wished behind it.
         let asked_after = match before {
+            Before::NewerConnection => {
+                return Err(Refusal::rule(
+                    "its connection was open before the last word without run came on another one: write one on this one first",
+                ));
+            }
             _ if runs => arrived,
-            Some((Word::WithoutRun, at)) => at,
-            _ => {
+            Before::WithoutRun(at) => at,
+            Before::NoWordWithoutRun => {
                 return Err(Refusal::rule(
                     "nothing starts by a run command that only goes on: write one without run first",
                 ));
             }
         };
-        self.plant.watched().start(watched(&self.config), peer, drive).await;
-        self.order_asked_after(caller, drive, action, (arrived, asked_after), deadline).await
+        self.plant.watched().start(watched(&self.config), who.by.peer, drive).await;
+        self.order_asked_after(who, drive, action, (arrived, asked_after), deadline).await
     }
 
     /// Whether what goes to a drive otherwise than as a command of the plant may begin.
@@ -391,8 +403,15 @@ impl Desk {
     }
 
     /// A step of the ladder is written as it is, so that the drive shows it. The motor stands, or it would be a stop.
-    async fn prepare(&self, drive: &DriveHandle, ask: &Ask, arrived: Instant) -> Result<(), Refusal> {
+    async fn prepare(
+        &self,
+        who: Who<'_>,
+        drive: &DriveHandle,
+        ask: &Ask,
+        arrived: Instant,
+    ) -> Result<(), Refusal> {
         self.may_begin()?;
+        self.clients.write_without_run(who.by, drive.place());
         let settings = drive.settings();
         if !settings.control || !settings.commanders.allow(&self.config.name) {
             return Err(Refusal::rule(format!("{} may not command this drive", self.config.name)));
@@ -413,7 +432,7 @@ impl Desk {
     /// Parameters: each is a row of the family that may be written, all are judged before the first is, and each is read back.
     async fn parameters(
         &self,
-        caller: &Caller,
+        who: Who<'_>,
         drive: &DriveHandle,
         ask: &Ask,
         deadline: Instant,
@@ -442,13 +461,13 @@ impl Desk {
         }
         for (row, word) in writes {
             let what = format!("{}: {} = {word}", drive.name(), row.code);
-            let record = self.audit.record(Record::new(Kind::Command, caller, what));
+            let record = self.audit.record(Record::new(Kind::Command, who.caller, what));
             record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
             self.is_still(&drive)?;
             let written = timeout_at(deadline, drive.write_parameter(row, word)).await;
             let written = written.map_err(|_| pending(&drive))?;
             let written = written.map_err(|refused| Refusal::rule(format!("{}: {refused}", row.code)))?;
-            self.plant.tell_written(caller, &drive, row, word, written.changed);
+            self.plant.tell_written(who.caller, &drive, row, word, written.changed);
         }
         Ok(())
     }
@@ -462,19 +481,19 @@ impl Desk {
     /// Gives an order to the fleet, and waits for what becomes of it as long as the client does.
     async fn order(
         &self,
-        caller: &Caller,
+        who: Who<'_>,
         drive: &DriveHandle,
         action: Action,
         arrived: Instant,
         deadline: Instant,
     ) -> Result<(), Refusal> {
-        self.order_asked_after(caller, drive, action, (arrived, arrived), deadline).await
+        self.order_asked_after(who, drive, action, (arrived, arrived), deadline).await
     }
 
     /// The same where a stop by another door since a moment goes before it.
     async fn order_asked_after(
         &self,
-        caller: &Caller,
+        who: Who<'_>,
         drive: &DriveHandle,
         action: Action,
         (arrived, asked_after): (Instant, Instant),
@@ -486,9 +505,9 @@ impl Desk {
         // While it waits for the audit log, the name may become another motor's.
         let expects = Some(Expects::of(drive));
         let request = Request { id: None, target, action, expects, lifetime, arrived };
-        let record = self.record(caller, drive, &request);
+        let record = self.record(who.caller, drive, &request);
         record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
-        match self.plant.command_asked_after(caller, request, asked_after, left()).await {
+        match self.plant.command_asked_after(who.caller, request, asked_after, left()).await {
             Ok(view) => self.judged(drive, view.outcome, view.text.as_deref()),
             Err(Rejected::NoDrive(name)) => Err(Refusal::new(
                 ExceptionCode::GatewayPathUnavailable,

@@ -8,7 +8,7 @@ use drive_profile::{definition, shipped};
 use tokio::time::sleep;
 
 use super::{Peer, config, names};
-use crate::desk::Desk;
+use crate::{clients::Course, desk::Desk};
 use drived_doors::{Role, audit::Audit};
 use drived_plant::plant::testing::TestPlant;
 
@@ -24,7 +24,7 @@ async fn a_coil_that_stops_a_drive_from_a_file_stops_it_through_a_gateway_and_on
     let plant = TestPlant::of_family(family, 1).await;
     let mut config = config();
     (config.rights, config.patience) = (Role::Operate.rights(), Duration::from_secs(3));
-    let desk = Desk::new(config, plant.plant.clone(), Audit::default(), names(&plant));
+    let desk = Desk::new(&Course::default(), config, plant.plant.clone(), Audit::default(), names(&plant));
     let mut peer = Peer::of(&desk);
     let pump = plant.plant.fleet().drive("pump 1").expect("it is there");
     let run = family.capabilities().rows.iter().find(|row| row.code == "RUN").expect("it has one").address;
@@ -42,6 +42,12 @@ async fn a_coil_that_stops_a_drive_from_a_file_stops_it_through_a_gateway_and_on
     }
     // Of a family that has no coils it is as before.
     let other = TestPlant::of(1).await;
-    let desk = Desk::new(desk.config.clone(), other.plant.clone(), Audit::default(), names(&other));
+    let desk = Desk::new(
+        &Course::default(),
+        desk.config.clone(),
+        other.plant.clone(),
+        Audit::default(),
+        names(&other),
+    );
     assert_eq!(Peer::of(&desk).ask(1, &COIL(0, false)).await, [0x85, 0x01]);
 }

@@ -1,6 +1,7 @@
 //! Clients of a gateway before a simulated plant, in virtual time.
 
 mod by_file;
+mod connections;
 mod reading;
 mod writing;
 
@@ -9,11 +10,11 @@ use std::{collections::BTreeMap, net::IpAddr, sync::Arc, time::Duration};
 use drive_bus::exchange::mbap;
 use drive_core::Class;
 use tokio::{
-    io::{AsyncReadExt as _, AsyncWriteExt as _, DuplexStream},
+    io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _, DuplexStream},
     time::Instant,
 };
 
-use super::{client, desk::Desk};
+use super::{client, clients::Course, desk::Desk};
 use crate::config::{GatewayConfig, Units};
 use drived_config::names::{Configured, Named, Names};
 use drived_doors::{
@@ -73,8 +74,8 @@ fn named(plant: &TestPlant) -> Configured {
 }
 
 /// A client that checks what every answer has to have.
-struct Peer {
-    stream: DuplexStream,
+struct Peer<S = DuplexStream> {
+    stream: S,
     sent: BTreeMap<u16, (u8, u8)>,
     next: u16,
 }
@@ -91,7 +92,14 @@ impl Peer {
     fn in_place(desk: &Arc<Desk>, address: IpAddr, place: Place) -> Self {
         let (stream, theirs) = tokio::io::duplex(4_096);
         let desk = Arc::clone(desk);
-        tokio::spawn(async move { client::serve(theirs, address, desk, &place).await });
+        let by = desk.clients.open(address);
+        tokio::spawn(async move { client::serve(theirs, by, desk, &place).await });
+        Self::over(stream)
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Peer<S> {
+    const fn over(stream: S) -> Self {
         Self { stream, sent: BTreeMap::new(), next: 0x1501 }
     }
 
@@ -141,6 +149,6 @@ async fn plant(drives: u8, change: impl FnOnce(&mut GatewayConfig)) -> (TestPlan
     let plant = TestPlant::of(drives).await;
     let mut config = config();
     change(&mut config);
-    let desk = Desk::new(config, plant.plant.clone(), Audit::default(), names(&plant));
+    let desk = Desk::new(&Course::default(), config, plant.plant.clone(), Audit::default(), names(&plant));
     (plant, desk)
 }

@@ -347,8 +347,9 @@ async fn the_task_of_a_client_that_takes_no_answer_any_more_ends_without_a_panic
     let (_plant, desk) = plant(1, |_| ()).await;
     let (mut near, theirs) = tokio::io::duplex(4_096);
     let address = "127.0.0.1".parse().unwrap();
+    let by = desk.clients.open(address);
     let served = tokio::spawn(async move {
-        super::client::serve(Deaf(theirs), address, desk, &super::place(address)).await;
+        super::client::serve(Deaf(theirs), by, desk, &super::place(address)).await;
     });
     near.write_all(&mbap::frame(1, 1, &read(ETA, 1))).await.unwrap();
     served.await.unwrap();

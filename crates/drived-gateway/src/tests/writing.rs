@@ -4,10 +4,14 @@ use std::{net::IpAddr, sync::Arc, time::Duration};
 
 use drive_core::{Direction, Frequency, StopMode};
 use drive_fleet::{EventKind, Received};
-use tokio::time::{Instant, sleep, timeout};
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    time::{Instant, sleep, timeout},
+};
 
 use super::{ETA, Peer, plant, read};
 use crate::{
+    clients::Course,
     config::{GatewayConfig, Units},
     desk::Desk,
     framing::Frame,
@@ -23,22 +27,22 @@ use drived_plant::plant::{
 };
 
 /// CMD, LFr and CMI: BBV51701 p. 19 and 20. ACC: p. 37. COL: p. 53.
-const CMD: u16 = 8_501;
-const LFR: u16 = 8_502;
+pub(super) const CMD: u16 = 8_501;
+pub(super) const LFR: u16 = 8_502;
 const CMI: u16 = 8_504;
 const ACC: u16 = 9_001;
 const COL: u16 = 7_011;
 
-fn write(register: u16, word: u16) -> Vec<u8> {
+pub(super) fn write(register: u16, word: u16) -> Vec<u8> {
     [&[0x06][..], &register.to_be_bytes(), &word.to_be_bytes()].concat()
 }
 
-fn write_two(register: u16, words: [u16; 2]) -> Vec<u8> {
+pub(super) fn write_two(register: u16, words: [u16; 2]) -> Vec<u8> {
     let [one, other] = words.map(u16::to_be_bytes);
     [&[0x10][..], &register.to_be_bytes(), &[0, 2, 4], &one, &other].concat()
 }
 
-async fn operated(drives: u8, change: impl FnOnce(&mut GatewayConfig)) -> (TestPlant, Arc<Desk>) {
+pub(super) async fn operated(drives: u8, change: impl FnOnce(&mut GatewayConfig)) -> (TestPlant, Arc<Desk>) {
     plant(drives, |config| {
         config.rights = Role::Operate.rights();
         config.patience = Duration::from_secs(3);
@@ -48,7 +52,7 @@ async fn operated(drives: u8, change: impl FnOnce(&mut GatewayConfig)) -> (TestP
 }
 
 /// What ETA shows under the mask of the chart, 006Fh (p. 10).
-async fn state(peer: &mut Peer, unit: u8) -> u16 {
+pub(super) async fn state<S: AsyncRead + AsyncWrite + Unpin>(peer: &mut Peer<S>, unit: u8) -> u16 {
     match peer.ask(unit, &read(ETA, 1)).await[..] {
         [0x03, 2, high, low] => u16::from_be_bytes([high, low]) & 0x006F,
         ref refused => panic!("{refused:02X?}"),
@@ -56,7 +60,7 @@ async fn state(peer: &mut Peer, unit: u8) -> u16 {
 }
 
 /// As a SCADA does it by the manual (p. 12): disable voltage, shut down, switch on, each once the drive shows it.
-async fn climb(peer: &mut Peer, unit: u8) {
+pub(super) async fn climb<S: AsyncRead + AsyncWrite + Unpin>(peer: &mut Peer<S>, unit: u8) {
     for (word, shown) in [(0x0000, 0x0040), (0x0006, 0x0021), (0x0007, 0x0023)] {
         assert_eq!(peer.ask(unit, &write(CMD, word)).await, write(CMD, word));
         assert_eq!(state(peer, unit).await, shown, "after {word:04X}h");
@@ -118,7 +122,7 @@ async fn a_quick_stop_by_one_client_locks_the_drive_for_every_client_of_every_ga
     sleep(Duration::from_secs(10)).await;
     let config = GatewayConfig { name: "other".to_owned(), ..desk.config.clone() };
     let names = super::names(&plant);
-    let second = Desk::new(config, plant.plant.clone(), Audit::default(), names);
+    let second = Desk::new(&Course::default(), config, plant.plant.clone(), Audit::default(), names);
     let mut others = [
         Peer::at(&desk, "127.0.0.2".parse().unwrap()),
         Peer::of(&second),
@@ -309,7 +313,8 @@ async fn a_drive_that_is_only_read_or_another_commanders_is_not_moved() {
     .await;
     let mut config = super::config();
     config.rights = Role::Operate.rights();
-    let desk = Desk::new(config, others.plant.clone(), Default::default(), Default::default());
+    let desk =
+        Desk::new(&Course::default(), config, others.plant.clone(), Default::default(), Default::default());
     let mut peer = Peer::of(&desk);
     assert_eq!(peer.ask(1, &write(CMD, 0x0006)).await, [0x86, 0x04]);
     assert_eq!(peer.ask(1, &write(LFR, 300)).await, [0x86, 0x04]);
@@ -500,10 +505,11 @@ async fn a_write_that_waits_for_the_disk_of_the_audit_log_moves_nothing_of_whoev
     let (plant, desk) = operated(2, by_names).await;
     let folder = drived_config::testing::Folder::new("gateway-audit");
     let audit = Audit::open(&folder.file("audit.jsonl")).unwrap();
-    let desk = Desk::new(desk.config.clone(), plant.plant.clone(), audit, super::names(&plant));
+    let desk =
+        Desk::new(&Course::default(), desk.config.clone(), plant.plant.clone(), audit, super::names(&plant));
     let frame = Frame { transaction: 1, unit: 1, pdu: write(LFR, 300) };
-    let client = "10.0.0.7".parse().unwrap();
-    let mut written = std::pin::pin!(desk.answer(client, desk.look_at(Instant::now(), &frame)));
+    let client = desk.clients.open("10.0.0.7".parse().unwrap());
+    let mut written = std::pin::pin!(desk.answer(&client, desk.look_at(Instant::now(), &frame)));
     let at_once = futures_util::future::poll_immediate(&mut written).await;
     assert_eq!(at_once, None, "it waits for the disk");
     plant.exchange_names();
@@ -559,7 +565,13 @@ async fn who_has_started_a_drive_is_watched_on_by_the_gateway_that_stands_where_
         let config =
             GatewayConfig { name: name.to_owned(), listen: listen.parse().unwrap(), ..desk.config.clone() };
         plant.plant.watched().set_doors(&[crate::desk::watched(&config)]);
-        let desk = Desk::new(config, plant.plant.clone(), Default::default(), super::names(&plant));
+        let desk = Desk::new(
+            &Course::default(),
+            config,
+            plant.plant.clone(),
+            Default::default(),
+            super::names(&plant),
+        );
         is_watched_on(&plant, Peer::of(&desk)).await;
     }
 }
@@ -574,7 +586,8 @@ async fn who_has_started_a_drive_by_a_gateway_that_is_gone_is_silent_whatever_he
         ..desk.config.clone()
     };
     plant.plant.watched().set_doors(&[crate::desk::watched(&other)]);
-    let desk = Desk::new(other, plant.plant.clone(), Default::default(), super::names(&plant));
+    let desk =
+        Desk::new(&Course::default(), other, plant.plant.clone(), Default::default(), super::names(&plant));
     let mut peer = Peer::of(&desk);
     for _ in 0..5 {
         sleep(Duration::from_secs(4)).await;
