@@ -5,6 +5,7 @@ use std::{sync::Arc, time::Duration};
 use bytes::Bytes;
 use drive_bus::exchange::mbap;
 use drive_core::tokio_modbus::ExceptionCode;
+use futures_util::future::poll_immediate;
 use tokio::{
     io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _},
     sync::{Semaphore, mpsc},
@@ -88,10 +89,23 @@ async fn read(
         };
         match timeout(patience, input.read(frames.room())).await {
             Err(_) => return Some(why),
-            Ok(Ok(0) | Err(_)) => return None,
+            Ok(Ok(0) | Err(_)) => {
+                by.close();
+                return None;
+            }
             Ok(Ok(bytes)) => frames.filled(bytes),
         }
         let arrived = Instant::now();
+        // Before anything is carried out: whether he has closed his side behind it.
+        while let room @ [_, ..] = frames.room()
+            && let Some(more) = poll_immediate(input.read(room)).await
+        {
+            let Ok(bytes @ 1..) = more else {
+                by.close();
+                break;
+            };
+            frames.filled(bytes);
+        }
         loop {
             let frame = match frames.next() {
                 Ok(Some(frame)) => frame,

@@ -4,7 +4,10 @@
 use std::{
     collections::HashMap,
     net::IpAddr,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use drive_fleet::Place;
@@ -37,6 +40,19 @@ pub(super) enum Before {
 pub(super) struct Connection {
     pub(super) peer: IpAddr,
     opened: Moment,
+    closed: AtomicBool,
+}
+
+impl Connection {
+    /// Its client has closed his side.
+    pub(super) fn close(&self) {
+        self.closed.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether its client may still hear what is answered.
+    pub(super) fn is_open(&self) -> bool {
+        !self.closed.load(Ordering::Relaxed)
+    }
 }
 
 /// One after the other, of all gateways of a program.
@@ -81,7 +97,7 @@ impl Clients {
 
     /// A client has opened a connection.
     pub(super) fn open(&self, peer: IpAddr) -> Connection {
-        Connection { peer, opened: lock(&self.course.0).next() }
+        Connection { peer, opened: lock(&self.course.0).next(), closed: AtomicBool::new(false) }
     }
 
     /// A client has asked for something.

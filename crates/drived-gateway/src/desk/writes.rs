@@ -56,6 +56,19 @@ struct Who<'a> {
     caller: &'a Caller,
 }
 
+impl Who<'_> {
+    /// Whether somebody is there who may hear what becomes of it. Only a stop is carried out for whom it is not so: what was held back on
+    /// the way comes together with the end of a connection that was given up long before.
+    fn hears(self) -> Result<(), Refusal> {
+        match self.by.is_open() {
+            true => Ok(()),
+            false => {
+                Err(Refusal::rule("its client has closed the connection: nobody would hear that it was done"))
+            }
+        }
+    }
+}
+
 /// A stop that waits for nothing, by this mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Stop(StopMode);
@@ -321,7 +334,7 @@ impl Desk {
                 self.start(who, drive, (direction, setpoint), action, (arrived, deadline)).await
             }
             Some(Intent::ResetFaults(_)) if shows_fault(drive) => {
-                self.may_begin()?;
+                self.may_begin(who)?;
                 self.clients.write_without_run(who.by, drive.place());
                 self.order(who, drive, Action::Reset, arrived, deadline).await?;
                 self.plant.quick_stops().unlock(drive);
@@ -354,7 +367,7 @@ impl Desk {
         (arrived, deadline): (Instant, Instant),
     ) -> Result<(), Refusal> {
         // Also whoever is heard for a motor that runs stays who he is.
-        self.may_begin()?;
+        self.may_begin(who)?;
         let before = self.clients.write_run(who.by, drive.place());
         let snapshot = drive.snapshot();
         let status = snapshot.fresh_status(Instant::now());
@@ -394,11 +407,11 @@ impl Desk {
         self.order_asked_after(who, drive, action, (arrived, asked_after), deadline).await
     }
 
-    /// Whether what goes to a drive otherwise than as a command of the plant may begin.
-    fn may_begin(&self) -> Result<(), Refusal> {
+    /// Whether what is no stop may begin, where the plant does not judge that or not yet.
+    fn may_begin(&self, who: Who<'_>) -> Result<(), Refusal> {
         match self.plant.is_closing() {
             true => Err(Refusal::rule(Rejected::Closing.to_string())),
-            false => Ok(()),
+            false => who.hears(),
         }
     }
 
@@ -410,7 +423,7 @@ impl Desk {
         ask: &Ask,
         arrived: Instant,
     ) -> Result<(), Refusal> {
-        self.may_begin()?;
+        self.may_begin(who)?;
         self.clients.write_without_run(who.by, drive.place());
         let settings = drive.settings();
         if !settings.control || !settings.commanders.allow(&self.config.name) {
@@ -464,6 +477,7 @@ impl Desk {
             let record = self.audit.record(Record::new(Kind::Command, who.caller, what));
             record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
             self.is_still(&drive)?;
+            who.hears()?;
             let written = timeout_at(deadline, drive.write_parameter(row, word)).await;
             let written = written.map_err(|_| pending(&drive))?;
             let written = written.map_err(|refused| Refusal::rule(format!("{}: {refused}", row.code)))?;
@@ -507,6 +521,7 @@ impl Desk {
         let request = Request { id: None, target, action, expects, lifetime, arrived };
         let record = self.record(who.caller, drive, &request);
         record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
+        who.hears()?;
         match self.plant.command_asked_after(who.caller, request, asked_after, left()).await {
             Ok(view) => self.judged(drive, view.outcome, view.text.as_deref()),
             Err(Rejected::NoDrive(name)) => Err(Refusal::new(

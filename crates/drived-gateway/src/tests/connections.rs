@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use tokio::{
+    io::AsyncWriteExt as _,
     net::{TcpListener, TcpStream},
     sync::watch,
 };
@@ -100,6 +101,31 @@ async fn a_scada_that_opens_a_connection_for_each_write_starts_and_stops_its_mot
         assert_eq!(door.connect().await.ask(1, &write(CMD, 0)).await, write(CMD, 0));
         assert!(!plant.machines[0].observe().running);
     }
+}
+
+/// Nobody is there who could hear that the motor runs.
+#[tokio::test]
+async fn of_a_client_that_has_closed_its_side_a_stop_is_carried_out_and_nothing_else() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let door = Door::of(&desk).await;
+    let mut scada = door.connect().await;
+    climb(&mut scada, 1).await;
+    for pdu in [write(CMD, RUN), write(LFR, 300), write_two(CMD, [RUN, 300])] {
+        let mut gone = door.connect().await;
+        gone.send(1, &pdu).await;
+        gone.stream.shutdown().await.unwrap();
+        assert_eq!(gone.answer().await.1, [pdu[0] | 0x80, 0x04], "{pdu:02X?}");
+        assert!(gone.is_ended().await);
+    }
+    assert_eq!(plant.machines[0].peek(LFR), Some(0));
+    assert!(!plant.machines[0].observe().running);
+    assert_eq!(scada.ask(1, &write_two(CMD, [RUN, 300])).await[0], 0x10);
+    assert!(plant.machines[0].observe().running);
+    let mut gone = door.connect().await;
+    gone.send(1, &write(CMD, 0)).await;
+    gone.stream.shutdown().await.unwrap();
+    assert_eq!(gone.answer().await.1, write(CMD, 0));
+    assert!(!plant.machines[0].observe().running);
 }
 
 /// A stop is a stop for all: whoever has written before it, on whatever gateway, has to say again that he means it.
