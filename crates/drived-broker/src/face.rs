@@ -103,7 +103,8 @@ fn of_mqtt(mqtt: &MqttConfig) -> String {
             format!("commands by {}", each.collect::<Vec<_>>().join(", "))
         }
     };
-    format!("{} at {}: {commands}", mqtt.base, servers.join(", "))
+    let issued = if mqtt.needs_issued { ", starts and setpoints only with issued_unix_ms" } else { "" };
+    format!("{} at {}: {commands}{issued}", mqtt.base, servers.join(", "))
 }
 
 /// What the daemon is called as an edge node, and what is done there.

@@ -541,6 +541,9 @@ fn without_a_section_nothing_is_told_to_a_broker_and_nobody_commands_unless_it_i
     assert_eq!(mqtt.servers, [address("broker", 8883, true), address("::1", 1884, false)]);
     assert_eq!((mqtt.commands, mqtt.discovery, &*mqtt.client_id), (false, Discovery::Off, "plant-north"));
     assert_eq!((mqtt.heartbeat, mqtt.interval), (Duration::from_secs(30), Duration::from_secs(1)));
+    assert!(!mqtt.needs_issued);
+    let needs = with_broker("[mqtt]\nservers = [\"mqtts://broker\"]\ncommands = true\nneeds_issued = true");
+    assert!(needs.unwrap().needs_issued);
 }
 
 #[test]
@@ -559,6 +562,8 @@ fn what_is_wrong_with_a_broker_is_told_with_its_place() {
         (format!("{tls}password = \"file\""), "a password of nobody"),
         (format!("{tls}discovery = \"on\""), "expected device, component or off"),
         (format!("{tls}[mqtt.commanders]\nhmi = \"operate\""), "expected commands = true"),
+        (format!("{tls}needs_issued = true"), "expected commands = true"),
+        (format!("{tls}commands = true\nneeds_issued = \"yes\""), "expected a boolean"),
         (format!("{tls}commands = true\n[mqtt.commanders]\n\"h/i\" = \"operate\""), "a level of a topic"),
         (format!("{tls}commands = true\n[mqtt.commanders]\nhmi = \"root\""), "unknown variant"),
         (format!("{tls}insecure = true"), "unknown field"),

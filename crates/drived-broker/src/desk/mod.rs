@@ -77,6 +77,8 @@ pub struct Message<A> {
     pub longest: Option<Duration>,
     /// It may come again, so that it has to have a name.
     pub needs_id: bool,
+    /// A start and a setpoint have to say when they were issued.
+    pub needs_issued: bool,
     /// Its name, where it says none.
     pub id: Option<String>,
     /// For the audit log.
@@ -178,6 +180,13 @@ impl<A: Answers + Sync> Desk<A> {
             (false, Some(longest)) => Lifetime::Said(longest),
             (false, None) => message.lifetime,
         };
+        let is_undated = issued.is_none() && message.sent_unix_ms.is_none();
+        if message.needs_issued
+            && is_undated
+            && matches!(request.action, Action::Start { .. } | Action::Setpoint { .. })
+        {
+            return Err(Refusal::IssuedNeeded);
+        }
         // Its time has run since it was sent; and the same command is the same again, whenever it comes.
         let age = age_of(
             [message.sent_unix_ms, issued],

@@ -29,6 +29,8 @@ pub enum Refusal {
         "expected an id: without one it may come again when nobody expects it, and its outcome is not found"
     )]
     IdNeeded,
+    #[error("expected issued_unix_ms: without it nobody can say how long it has waited where it comes from")]
+    IssuedNeeded,
     #[error("too many commands are waiting")]
     Busy,
     #[error("{0}: until it can, only stops are carried out")]
@@ -57,6 +59,7 @@ impl Refusal {
             Self::Unclear(Unclear::Ambiguous(_)) => "ambiguous",
             Self::Unclear(_) => "malformed",
             Self::IdNeeded => "id_needed",
+            Self::IssuedNeeded => "issued_needed",
             Self::Busy => "busy",
             Self::Audit(_) => "audit",
         };

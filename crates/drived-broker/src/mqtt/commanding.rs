@@ -146,6 +146,7 @@ impl Commanding {
             lifetime: LIFETIME,
             longest: expires.map(|seconds| Duration::from_secs(seconds.into())),
             needs_id: arrived.repeated || arrived.qos == Qos::AtLeastOnce,
+            needs_issued: face.config.needs_issued,
             id: arrived.properties.correlation.as_deref().map(id_of),
             what: format!("MQTT {}", arrived.topic),
             answers: self.answers(arrived, face.topics.outcome(&asking.meant)),

@@ -35,6 +35,7 @@ fn config() -> MqttConfig {
         measurements: Duration::from_secs(10),
         commands: true,
         commanders: BTreeMap::new(),
+        needs_issued: false,
         discovery: Discovery::Device,
         discovery_prefix: "homeassistant".to_owned(),
     }
@@ -476,6 +477,65 @@ async fn a_command_that_says_when_it_was_issued_is_the_same_whenever_it_comes() 
     let second = bench.answers().pop().unwrap();
     assert_eq!((&second["outcome"], &second["reason"]), (&first["outcome"], &first["reason"]), "{second}");
     assert!(bench.runs(0));
+}
+
+/// How long it has waited in a client that had no connection nobody but its publisher knows.
+#[tokio::test(start_paused = true)]
+async fn where_it_is_wanted_nothing_starts_or_gets_a_setpoint_that_does_not_say_when_it_was_issued() {
+    let bench = Bench::with(TestPlant::of(1).await, MqttConfig { needs_issued: true, ..config() }).await;
+    let setpoint = r#"{"id": "s", "action": "setpoint", "setpoint": {"frequency_hz": 20.0}}"#;
+    let undated = [
+        ("command", start("a").to_string()),
+        ("command", setpoint.to_owned()),
+        ("set/run", "forward".to_owned()),
+        ("set/frequency", "20".to_owned()),
+    ];
+    for (topic, payload) in undated {
+        bench.ask(&format!("drive/pump_1/{topic}"), &payload);
+        sleep(Duration::from_secs(3)).await;
+        let told = bench.answers().pop().expect("it is answered");
+        assert_eq!(
+            (&told["outcome"], &told["reason"]),
+            (&"refused".into(), &"issued_needed".into()),
+            "{told}"
+        );
+        assert!(!bench.runs(0), "{payload}");
+    }
+    let issued = |id: &str, ago: u64| {
+        let mut start = start(id);
+        start["issued_unix_ms"] = (drived_words::json::unix(Instant::now()) - ago).into();
+        start
+    };
+    bench.command(&issued("late", 11_000));
+    a_while().await;
+    assert_eq!((bench.runs(0), &bench.answers().pop().unwrap()["reason"]), (false, &"expired".into()));
+    bench.command(&issued("now", 0));
+    a_while().await;
+    assert!(bench.runs(0), "{:?}", bench.answers());
+    // What starts nothing needs none, and a stop never does.
+    bench.ask("drive/pump_1/set/run", "stop");
+    sleep(Duration::from_secs(20)).await;
+    assert!(!bench.runs(0));
+    bench.ask("drive/pump_1/reset", "");
+    a_while().await;
+    assert_ne!(bench.answers().pop().unwrap()["outcome"], "refused");
+}
+
+/// By its own clock, when its button is pressed.
+#[tokio::test(start_paused = true)]
+async fn home_assistant_says_when_a_command_was_issued_where_that_is_wanted() {
+    let bench = Bench::with(TestPlant::of(1).await, MqttConfig { needs_issued: true, ..config() }).await;
+    a_while().await;
+    let document = bench.state("homeassistant/device/plant_north_pump_1/config");
+    for control in ["setpoint", "start", "start_reverse"] {
+        let control = &document["components"][control];
+        assert_eq!(control["command_topic"], "plant/north/drive/pump_1/command", "{control}");
+        let template = control["command_template"].as_str().unwrap();
+        assert!(template.contains("'issued_unix_ms': (now().timestamp() * 1000) | int"), "{control}");
+    }
+    for control in ["stop", "reset"] {
+        assert!(document["components"][control].get("command_template").is_none(), "{control}");
+    }
 }
 
 #[tokio::test(start_paused = true)]
@@ -1007,9 +1067,9 @@ async fn the_documents_fit_the_schema_of_what_home_assistant_checks() {
     for (discovery, part) in
         [(Discovery::Device, "device_document"), (Discovery::Component, "component_document")]
     {
-        for commands in [true, false] {
-            let bench =
-                Bench::with(TestPlant::of(1).await, MqttConfig { discovery, commands, ..config() }).await;
+        for (commands, needs_issued) in [(true, false), (true, true), (false, false)] {
+            let config = MqttConfig { discovery, commands, needs_issued, ..config() };
+            let bench = Bench::with(TestPlant::of(1).await, config).await;
             a_while().await;
             let mut documents = 0;
             for (topic, publish) in bench.broker.retained() {

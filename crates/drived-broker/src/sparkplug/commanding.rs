@@ -90,6 +90,8 @@ impl Commanding {
             let drive = drive.unwrap_or_else(|| format!("{device}, which is gone"));
             self.desk.take(Message {
                 needs_id: matches!(&write, Ok(write) if write.name == COMMAND),
+                // Its payload says it.
+                needs_issued: false,
                 doubt: read_only(&write).or(of_the_past).or(doubt),
                 said: said(write),
                 caller: self.caller.clone(),

@@ -123,13 +123,20 @@ fn at_home_assistant_itself_a_drive_is_commanded_trips_is_lost_and_acknowledged_
     home.wait("binary_sensor.pump_2_answers", "unavailable");
     let text = fs::read_to_string(daemon.file.path()).expect("it is ours");
     // From here on with short heartbeats: behind a restart what is gone is taken back when three of them are over.
-    let text = text.replace("discovery =", "heartbeat = \"5s\"\ndiscovery =");
+    // And each start has to say when it was issued.
+    let text = text.replace("discovery =", "heartbeat = \"5s\"\nneeds_issued = true\ndiscovery =");
     fs::write(daemon.file.path(), text.replace("pump {}", "fan {}")).expect("it is ours");
     home.say("forget");
     daemon.start_again();
     home.wait("binary_sensor.pump_2_answers", "on");
     home.say("named binary_sensor.pump_2_answers fan 2");
     assert!(!home.seen("binary_sensor.pump_2_answers").contains(&"-".to_owned()), "it is never taken away");
+    let told = home.command("set number.pump_2_setpoint 25", "pump_2");
+    assert_eq!((&told["action"], &told["reason"]), (&json!("setpoint"), &Value::Null), "{told}");
+    home.command("press button.pump_2_start", "pump_2");
+    home.wait("binary_sensor.pump_2_turning", "on");
+    home.say("press button.pump_2_stop");
+    home.wait("binary_sensor.pump_2_turning", "off");
 
     // One leaves while the daemon is away: it goes with all it had, and without a complaint.
     daemon.kill();

@@ -61,6 +61,8 @@ pub struct MqttConfig {
     pub commands: bool,
     /// What those may do whose names are the last level of the topic; empty: everybody operates, and is called `mqtt`.
     pub commanders: BTreeMap<String, Role>,
+    /// Whether a start and a setpoint have to say when they were issued.
+    pub needs_issued: bool,
     pub discovery: Discovery,
     /// The first levels of the topics that Home Assistant reads.
     pub discovery_prefix: String,
@@ -157,6 +159,7 @@ pub struct MqttEntry {
     commands: bool,
     #[serde(default)]
     commanders: BTreeMap<Spanned<String>, Role>,
+    needs_issued: Option<Spanned<bool>>,
     discovery: Option<Parsed<Discovery>>,
     discovery_prefix: Option<Spanned<String>>,
     pub sparkplug: Option<SparkplugEntry>,
@@ -172,15 +175,19 @@ impl MqttConfig {
         if let Some((_, span)) = client_id.as_ref().filter(|(id, _)| !is_plain(id) || id.is_empty()) {
             return Err(source.error(span.clone(), "expected a name without spaces and control characters"));
         }
+        let nobody = "nobody may command through the broker: expected commands = true";
         for name in entry.commanders.keys() {
             if topic_id(name.get_ref()) != *name.get_ref() || name.get_ref().is_empty() {
                 let problem = "it is a level of a topic: expected letters, digits, - and _";
                 return Err(source.error(name.span(), problem));
             }
             if !entry.commands {
-                let problem = "nobody may command through the broker: expected commands = true";
-                return Err(source.error(name.span(), problem));
+                return Err(source.error(name.span(), nobody));
             }
+        }
+        let needs_issued = entry.needs_issued.as_ref().filter(|said| *said.get_ref());
+        if let Some(said) = needs_issued.filter(|_| !entry.commands) {
+            return Err(source.error(said.span(), nobody));
         }
         let heartbeat = entry.heartbeat.as_ref().map_or(HEARTBEAT, |time| time.get_ref().0.0);
         if let Some(said) = entry.heartbeat.as_ref().filter(|_| heartbeat < SHORTEST_HEARTBEAT) {
@@ -207,6 +214,7 @@ impl MqttConfig {
             measurements: entry.measurements.map_or(MEASUREMENTS, |time| time.0.0).min(heartbeat),
             commands: entry.commands,
             commanders: entry.commanders.iter().map(|(name, role)| (name.get_ref().clone(), *role)).collect(),
+            needs_issued: needs_issued.is_some(),
             discovery: entry.discovery.map(|discovery| discovery.0).unwrap_or_default(),
             discovery_prefix: levels(source, entry.discovery_prefix.as_ref(), PREFIX)?,
         })

@@ -139,6 +139,16 @@ fn controls(face: &Face, drive: &DriveHandle, id: &str) -> [Component; 5] {
         values["message_expiry_interval"] = COMMANDS_EXPIRE_S.into();
         values
     };
+    // Where it has to say when it was issued, by an object that does: a plain word has no room for it.
+    let issued = |mut values: Value, asks: &str| {
+        if face.config.needs_issued {
+            values["command_topic"] = topic(Verb::Command).into();
+            values["command_template"] =
+                format!("{{{{ {{{asks}, 'issued_unix_ms': (now().timestamp() * 1000) | int}} | to_json }}}}")
+                    .into();
+        }
+        moving(values)
+    };
     let hertz = |frequency: drive_core::Frequency| f64::from(frequency.centihertz()) / 100.0;
     let (low, high) =
         (settings.limits.low.map_or(0.0, hertz), settings.limits.high.map_or(USUAL_HIGH_HZ, hertz));
@@ -156,10 +166,12 @@ fn controls(face: &Face, drive: &DriveHandle, id: &str) -> [Component; 5] {
     let mut stop = button("Stop", topic(Verb::Stop), "ramp");
     stop["availability"] = while_the_daemon_is(&face.topics);
     stop["availability_mode"] = "all".into();
-    let start = |name, word| moving(button(name, topic(Verb::Run), word));
+    let start =
+        |name, word| issued(button(name, topic(Verb::Run), word), "'action': 'start', 'direction': value");
+    let setpoint = issued(setpoint, "'action': 'setpoint', 'setpoint': {'frequency_hz': value}");
     let when = |may: bool, values: Value| if may { values } else { Value::Null };
     [
-        component("setpoint", "number", when(may_operate, moving(setpoint))),
+        component("setpoint", "number", when(may_operate, setpoint)),
         component("start", "button", when(may_operate, start("Start", "forward"))),
         component("start_reverse", "button", when(may_operate, start("Start in reverse", "reverse"))),
         // A stop is never too late, and goes to a drive that is lost as soon as it is back.
