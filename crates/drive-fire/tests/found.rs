@@ -140,6 +140,9 @@ fn no_story_that_was_a_find_is_one_again() {
             "0.4.0.s0.o6.l6.o8.f71x1.l4",
             "a 21 that tripped in the middle of a status behind a stop told at rest at 0.7 Hz, by a word of before and one of behind",
         ),
+        ("1.0.0.o5.l4.d7x13.l6", "a 28 whose setpoint nobody waited for was told to follow another master's"),
+        ("2.0.0.o5.l4.d7x10.l6", "the same of a 58"),
+        ("3.0.0.o5.l4.d7x10.l6", "the same of a 312"),
         (
             "3.4.0.f7x1.o2.f60x2.o9",
             "a 312 over Modbus TCP whose answer had another one in its middle: the stage was wrong",

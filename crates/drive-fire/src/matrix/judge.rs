@@ -7,7 +7,7 @@ use std::{
 };
 
 use async_trait::async_trait;
-use drive_core::{Class, Effect, Motion, Port, PortError, SlaveAddress, Status, Terms};
+use drive_core::{Class, Effect, Lack, Motion, Port, PortError, SlaveAddress, Status, Terms, Verdict};
 use drive_sim::{Received, SimSlave};
 use drive_testing::truth::contradiction;
 use tokio::time::Instant;
@@ -38,6 +38,8 @@ struct Noted {
     unseen_until: Option<Instant>,
     /// A rule was broken that holds whatever the drive is told.
     breaks_a_rule: bool,
+    /// Nobody but this side commands the drive.
+    alone: bool,
     /// Edges that were given, with when.
     edges: Vec<(Vec<u8>, Instant)>,
     /// Writes of levels, of whose repetitions nothing is said.
@@ -83,6 +85,11 @@ impl Notes {
         } else if gap {
             noted.unseen_until = Some(at);
         }
+    }
+
+    /// Whether nobody but this side commands the drive: nobody else gives it a reference then.
+    pub(super) fn alone(&self, is_alone: bool) {
+        self.noted().alone = is_alone;
     }
 
     /// A stop was confirmed: the motor was seen to come down, whatever its status was told of before.
@@ -297,6 +304,12 @@ impl Port for Judged {
 impl Bench {
     /// What the machine has against a status that was asked for at `asked`.
     pub(super) fn judge_status(&self, status: &Status, asked: Instant, fresh: bool) {
+        if let Some(Verdict::NotInForce { lacks: Lack::Reference, because }) = status.verdict
+            && self.notes.noted().alone
+        {
+            self.notes
+                .object(format!("told to follow another's reference, and nobody else is there: {because}"));
+        }
         if let Some(at) = status.at {
             self.notes.looked(at, status.motion, self.machine.observe().shaft_frequency != 0);
             let now = Instant::now();

@@ -14,6 +14,8 @@ use crate::report::{Find, Told};
 pub enum Step {
     /// The drive is asked this.
     Ask(Operation),
+    /// The drive is asked this, and nobody waits for it any more so many times 5 ms later: its call is dropped.
+    Drops(Operation, u8),
     /// This strikes at so many exchanges from here.
     Strike(Fault, usize),
     /// This happens to the drive.
@@ -68,6 +70,7 @@ impl Story {
             let (first, second) = (first.parse::<usize>().ok()?, second.parse::<usize>().ok()?);
             Some(match kind {
                 "o" => Step::Ask(*Operation::ALL.get(first)?),
+                "d" => Step::Drops(*Operation::ALL.get(first)?, second as u8),
                 "f" => Step::Strike(*Fault::ALL.get(first)?, second),
                 "e" => Step::Happens(*Event::ALL.get(first)?),
                 "s" => Step::Sets(first as u8),
@@ -84,6 +87,18 @@ impl Story {
             far_end: *FarEnd::ALL.get(far_end)?,
             steps,
         })
+    }
+
+    /// Whether nobody but this side commands the drive or sets anything in it.
+    #[must_use]
+    pub fn is_alone(&self) -> bool {
+        let others = |step: &Step| {
+            matches!(
+                step,
+                Step::Happens(_) | Step::Sets(_) | Step::Ask(Operation::Release | Operation::WriteParameter)
+            )
+        };
+        self.far_end != FarEnd::Twins && !self.steps.iter().any(others)
     }
 
     /// What in it nobody can tell from what is right.
@@ -134,6 +149,7 @@ impl fmt::Display for Story {
         for step in &self.steps {
             match step {
                 Step::Ask(operation) => write!(f, ".o{}", place(&Operation::ALL, operation))?,
+                Step::Drops(operation, cut) => write!(f, ".d{}x{cut}", place(&Operation::ALL, operation))?,
                 Step::Strike(fault, behind) => write!(f, ".f{}x{behind}", place(Fault::ALL, fault))?,
                 Step::Happens(event) => write!(f, ".e{}", place(&Event::ALL, event))?,
                 Step::Sets(setting) => write!(f, ".s{setting}")?,
@@ -151,6 +167,7 @@ impl Story {
         let mut words = vec![format!("{}, {}, {}", self.subject, self.way, self.far_end)];
         words.extend(self.steps.iter().map(|step| match step {
             Step::Ask(operation) => operation.to_string(),
+            Step::Drops(operation, cut) => format!("{operation}, dropped after {} ms", u32::from(*cut) * 5),
             Step::Strike(fault, behind) => format!("{fault}, {behind} exchanges from here"),
             Step::Happens(event) => event.to_string(),
             Step::Sets(setting) => {
@@ -189,7 +206,7 @@ fn some_steps(rng: &mut Rng, subject: Subject, way: Way) -> Vec<Step> {
 
 fn a_step(rng: &mut Rng, subject: Subject, way: Way) -> Step {
     for _ in 0..64 {
-        match rng.u8(..10) {
+        match rng.u8(..11) {
             0..=4 => {
                 // What moves or stops the motor is asked more often than what reads.
                 let operation = match rng.u8(..3) {
@@ -210,6 +227,13 @@ fn a_step(rng: &mut Rng, subject: Subject, way: Way) -> Step {
                 let event = Event::ALL[rng.usize(1..Event::ALL.len())];
                 if event.impossible_for(subject).is_none() {
                     return Step::Happens(event);
+                }
+            }
+            8 => {
+                let operation =
+                    if rng.bool() { Operation::Setpoint } else { Operation::ALL[5 + rng.usize(..7)] };
+                if operation.impossible_for(subject, false).is_none() {
+                    return Step::Drops(operation, rng.u8(..40));
                 }
             }
             _ => return Step::Live(rng.u8(1..9)),

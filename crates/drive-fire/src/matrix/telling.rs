@@ -26,11 +26,20 @@ struct Done {
     touched: bool,
 }
 
+impl Done {
+    fn asked(&mut self, operation: Operation) {
+        self.started |= matches!(operation, Operation::Start(_));
+        self.released |= operation == Operation::Release;
+        self.reset |= operation == Operation::Reset;
+    }
+}
+
 pub(super) async fn tell(story: &Story, open: &Open) -> Lived {
     let stalls = story.steps.iter().any(|step| matches!(step, Step::Strike(Fault::Stall(_), _)));
     let Story { subject, way, far_end, .. } = *story;
     let seed = story.steps.len() as u64;
     let mut stage = Stage::new(&Site { subject, way, far_end, seed, stalls }, open);
+    stage.bench.notes.alone(story.is_alone());
     let mut done = Done::default();
     poll_for(&mut stage, Duration::from_secs(1)).await;
     let _ = timeout(PATIENCE, stage.drive.set_setpoint(SETPOINT.into())).await;
@@ -40,6 +49,13 @@ pub(super) async fn tell(story: &Story, open: &Open) -> Lived {
                 if ask(story, &mut stage, operation, &mut done).await.is_none() {
                     return Lived::Against(vec![format!("{operation} does not end in {PATIENCE:?}")]);
                 }
+            }
+            Step::Drops(operation, cut) => {
+                let asks = Asks { operation, subject, touched: done.touched };
+                let _ = timeout(Duration::from_millis(u64::from(cut) * 5), operate(asks, &mut stage)).await;
+                done.asked(operation);
+                // What is on the wire finishes there.
+                sleep(Duration::from_millis(500)).await;
             }
             Step::Strike(fault, behind) => stage.bench.tap.strike(fault, behind),
             Step::Happens(event) => {
@@ -107,9 +123,7 @@ async fn ask(story: &Story, stage: &mut Stage, operation: Operation, done: &mut 
         }
         _ => {}
     }
-    done.started |= matches!(operation, Operation::Start(_));
-    done.released |= operation == Operation::Release;
-    done.reset |= operation == Operation::Reset;
+    done.asked(operation);
     if matches!(operation, Operation::Stop(_)) && told.is_ok() && !done.touched {
         // Behind a confirmed stop it steers for nothing, or comes down.
         let before = seen.output_frequency.abs();
