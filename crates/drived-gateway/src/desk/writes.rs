@@ -1,12 +1,14 @@
 //! Writes: judged as commands of the fleet are, carried out by it, and confirmed once they are in force.
 
+use std::time::Duration;
+
 use drive_core::{
     Class, Direction, Drive, Error, Intent, Row, Setpoint, StopMode, Terms, tokio_modbus::ExceptionCode,
 };
 use drive_families::Family;
 use drive_fleet::{DriveHandle, Link, Until};
 use futures_util::{FutureExt as _, future::join_all};
-use tokio::time::{Instant, timeout_at};
+use tokio::time::{Instant, sleep_until, timeout_at};
 
 use super::{Answer, Desk};
 use crate::{
@@ -48,6 +50,10 @@ struct Wanted {
     command: Option<Intent>,
     setpoint: Option<Setpoint>,
 }
+
+/// How long a start waits for the end of its connection. Where both were held back on the way the end comes second: by the round trip of
+/// the confirmation, which a system may put off by 40 ms.
+const END_FOLLOWS: Duration = Duration::from_millis(100);
 
 /// Who writes: on which connection, and as whom the plant knows him.
 #[derive(Clone, Copy)]
@@ -403,6 +409,8 @@ impl Desk {
                 ));
             }
         };
+        sleep_until((arrived + END_FOLLOWS).min(deadline)).await;
+        who.hears()?;
         self.plant.watched().start(watched(&self.config), who.by.peer, drive).await;
         self.order_asked_after(who, drive, action, (arrived, asked_after), deadline).await
     }

@@ -1,11 +1,12 @@
 //! What several connections of one SCADA carry, over sockets and in real time: what a cable held back comes when its kernel sends it again.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use tokio::{
     io::AsyncWriteExt as _,
     net::{TcpListener, TcpStream},
     sync::watch,
+    time::sleep,
 };
 
 use super::{
@@ -125,6 +126,19 @@ async fn of_a_client_that_has_closed_its_side_a_stop_is_carried_out_and_nothing_
     gone.send(1, &write(CMD, 0)).await;
     gone.stream.shutdown().await.unwrap();
     assert_eq!(gone.answer().await.1, write(CMD, 0));
+    assert!(!plant.machines[0].observe().running);
+}
+
+/// It was sent behind the run command, was held back as that was, and comes once that is confirmed.
+#[tokio::test(start_paused = true)]
+async fn a_run_command_behind_which_the_end_of_its_connection_comes_in_a_moment_starts_nothing() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let mut scada = Peer::of(&desk);
+    climb(&mut scada, 1).await;
+    scada.send(1, &write(CMD, RUN)).await;
+    sleep(Duration::from_millis(45)).await;
+    scada.stream.shutdown().await.unwrap();
+    assert_eq!(scada.answer().await.1, [0x86, 0x04]);
     assert!(!plant.machines[0].observe().running);
 }
 
