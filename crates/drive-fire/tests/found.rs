@@ -219,12 +219,6 @@ fn no_order_of_a_line_that_was_a_find_is_one_again() {
             "fjjdjkfaikackmimjfakjhlifl",
             "the same where two of the lengths were answered behind a damaged answer, and the model was wrong",
         ),
-        (
-            "Wire",
-            "fmfiakimmljkml",
-            "the own answer of a question that was taken for answered, to the same one asked again",
-        ),
-        ("Wire", "eijafifijakilkkil", "the same of one whose answer was thrown away as an earlier one's"),
         ("Gateway", "aaaaaaaaaaaaaaaaa", "seventeen stops in vain end after 300 s: the model was wrong"),
         ("Gateway", &"a".repeat(60), "the same of sixty"),
     ] {

@@ -50,7 +50,7 @@ impl<C> Master<C> {
 
     /// What has come counts as what was owed; that to this question may still come.
     pub(super) fn throw_away_for(&mut self, now: Instant, flight: &Flight<C>) {
-        let until = self.late_until(now, flight).max(now + flight.patience.max(config::DOUBLE));
+        let until = now + flight.patience.max(config::DOUBLE);
         self.station(flight.slave).doubt.threw_away(now, flight.shape, until);
     }
 

@@ -180,26 +180,18 @@ impl Doubt {
     }
 
     /// An answer of this shape was taken. It may come twice within `double`, and on this line answers were seen to come again
-    /// after `again`. Where it may have been one that was owed its own may come until `own`. A protocol without shapes has its own proofs.
-    pub(super) fn answered(
-        &mut self,
-        now: Instant,
-        shape: Shape,
-        double: Duration,
-        (again, own): (Option<Duration>, Instant),
-    ) {
+    /// after `again`. A protocol without shapes has its own proofs.
+    pub(super) fn answered(&mut self, now: Instant, shape: Shape, double: Duration, again: Option<Duration>) {
         if shape == Shape::ANY {
             return;
         }
         self.known
             .retain(|known| known.avoid > now && (known.shape != shape || known.will_come || known.stray));
-        let mut may_be_another = false;
         for known in self.known.iter_mut().filter(|known| known.wait <= now) {
             known.wrote = None;
             // Once: a shape that is asked for all the time would be avoided for ever.
             if known.owed && known.shape == shape && !known.may_have_come {
                 (known.may_have_come, known.avoid) = (true, now + MEMORY);
-                may_be_another = true;
             }
         }
         let strange = self.is_strange(now);
@@ -207,7 +199,6 @@ impl Doubt {
         let owes = self.known.iter().any(|known| known.owed);
         let unexplained = self.unexplained_until.is_some_and(|until| until > now);
         let wait = now + again.or((unexplained || owes).then_some(DOUBLE)).unwrap_or_default();
-        let wait = if may_be_another { wait.max(own) } else { wait };
         self.remember(now, Known::come(shape, wait, now + if strange { MEMORY } else { double }));
     }
 

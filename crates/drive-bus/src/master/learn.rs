@@ -53,7 +53,6 @@ impl<C> Master<C> {
         let given_up = self.far_end.answered(now, flight.slave, flight.behind, at_once);
         self.nobody_answered(now, given_up);
         self.second.settled(now, flight.slave, flight.asked_at);
-        let own = self.late_until(now, flight);
         let station = self.station(flight.slave);
         match read {
             Some(read) => station.row.told(now, read),
@@ -72,7 +71,7 @@ impl<C> Master<C> {
             Ok(_) => {
                 station.stats.outcomes.answered += 1;
                 if confuses {
-                    station.doubt.answered(now, flight.shape, double, (again, own));
+                    station.doubt.answered(now, flight.shape, double, again);
                     if let Some(frame) = taken {
                         station.doubt.took(now, frame, flight.asked_at);
                     }
@@ -167,27 +166,22 @@ impl<C> Master<C> {
         if flight.slave == 0 || !confuses {
             return;
         }
+        let station = self.station(flight.slave);
+        let timeout = flight.sent.map_or(station.timeout.current(), |sent| sent.timeout);
+        // A slave that may take longer than the window to answer in time may take longer still to be late.
+        let window = self.config.late_window.max(timeout * 3 / 2);
+        let sent = flight.sent.map_or(self.end_of_sending(now), |sent| sent.end);
         let lost = !matches!(self.port, PortState::Open);
-        let until = self.late_until(now, flight);
+        let from = if flight.stalled { now } else { sent };
         let doubt = &mut self.station(flight.slave).doubt;
-        doubt.owe(now, flight.shape, flight.wrote, until, lost);
+        doubt.owe(now, flight.shape, flight.wrote, from + window, lost);
         if lost {
             // The first answer over the next port is thrown away for all of them.
             doubt.is_in_step();
         }
         if flight.stalled {
-            doubt.hold(now, until);
+            doubt.hold(now, from + window);
         }
-    }
-
-    /// Until when its own answer may still come.
-    pub(super) fn late_until(&mut self, now: Instant, flight: &Flight<C>) -> Instant {
-        let current = self.station(flight.slave).timeout.current();
-        let timeout = flight.sent.map_or(current, |sent| sent.timeout);
-        // A slave that may take longer than the window to answer in time may take longer still to be late.
-        let window = self.config.late_window.max(timeout * 3 / 2);
-        let sent = flight.sent.map_or(self.end_of_sending(now), |sent| sent.end);
-        if flight.stalled { now + window } else { sent + window }
     }
 
     /// A slave did not answer a question, `short` or not. True: it goes off-line with this.

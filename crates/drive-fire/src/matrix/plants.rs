@@ -112,7 +112,7 @@ const FOUND: &[(&str, &str)] = &[
     ("family: AlwaysInForce", "E:24482"),
     ("family: ForgetEndsTheLease", "E:19106"),
     ("family: StopSentEndsTheLease", "E:35943"),
-    ("family: NoOutputIsStandstill", "E:48897"),
+    ("family: NoOutputIsStandstill", "F:1525394"),
     ("line: crc-unchecked", "A:35571058"),
     ("line: transaction-unchecked", "W:201890"),
     ("line: silence-unkept", "E:76152"),
