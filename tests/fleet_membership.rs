@@ -98,7 +98,7 @@ async fn a_running_drive_that_is_removed_ends_by_its_policy_and_the_others_go_on
     assert!(&**name == "1" && outcome.is_confirmed(), "{outcome}");
     assert!(!runs(&plant, 1) && runs(&plant, 2));
     assert!(plant.fleet.drive("1").is_none());
-    assert_eq!(removed.start(Direction::Forward).await, Outcome::Refused(Refused::ShutDown));
+    assert_eq!(removed.start(Direction::Forward).await, Outcome::Refused(Refused::Removed));
     plant.events_so_far().await;
     let report = group.stop(StopMode::Ramp).await;
     assert_eq!((report.confirmed, report.unconfirmed.len()), (vec!["2".into()], 1));
@@ -125,7 +125,8 @@ async fn who_ends_beside_a_silent_drive_is_asked_and_stopped_until_both_are_done
         assert!(runs(&plant, 2) && neighbour.snapshot().link == Link::Connected, "nobody has stopped it");
         let outcome = neighbour.stop(StopMode::Ramp).await;
         assert!(outcome.is_confirmed() && !runs(&plant, 2), "{outcome}");
-        assert_eq!(neighbour.start(Direction::Forward).await, Outcome::Refused(Refused::ShutDown));
+        let why = if is_shutdown { Refused::ShutDown } else { Refused::Removed };
+        assert_eq!(neighbour.start(Direction::Forward).await, Outcome::Refused(why));
         silent.unmute();
         let actions = ended.await.expect("it ends");
         let [(_, ExitAction::Stopped(outcome)), (_, ExitAction::Left)] = &*actions else {

@@ -181,6 +181,9 @@ impl<P: Port> Atv21<P> {
     /// with ST on (bits 10, 11, 13), and FE02 is the reference of the bus. A motor that turned the other way slows down
     /// first: it is on its way, and the status tells the direction in which it still turns.
     async fn see_start(&mut self, direction: Direction, word: CommandWord) -> Result<Status> {
+        // Whether UL bounds FE02 no manual says; it bounds the output. Read before: nothing is behind the last look, which shows a stop of
+        // somebody else's.
+        let high = self.upper_limit().await.ok();
         let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
         let mut first = None;
         loop {
@@ -193,11 +196,7 @@ impl<P: Port> Atv21<P> {
             let directed = status.direction == Some(direction) || is_falling(first, status.output_frequency);
             if because.is_none() && runs && directed {
                 let verdict = self.verdict(&status);
-                let mut reference = status.reference;
-                if let Some(told) = &mut reference {
-                    // Whether UL bounds FE02 no manual says; it bounds the output.
-                    *told = self.upper_limit().await.map_or(*told, |high| high.min(*told));
-                }
+                let reference = status.reference.map(|told| high.map_or(told, |high| high.min(told)));
                 return Ok(Status { verdict, reference, ..status });
             }
             first = first.or(status.output_frequency);

@@ -11,7 +11,6 @@ use crate::{
     address::SlaveAddress,
     capabilities::Capabilities,
     confirm::{CONFIRMED_WITHIN, Confirming},
-    drive::Follower,
     error::{BUSY, Error, ErrorKind, ExceptionMeaning, Exchange, Result},
     identity::Identity,
     kept_readings::KeptReadings,
@@ -19,6 +18,7 @@ use crate::{
     registers::{Place, Register, Row, Written},
     setpoint::Command,
     status::{RawWord, Status},
+    stopped::Follower,
 };
 
 /// How long a drive that answers that it is busy is asked again by a call without a lifetime, and how long one that has

@@ -19,7 +19,7 @@ use crate::{
     registers::{Place, Row, Written},
     setpoint::{Direction, Setpoint, StopMode},
     status::{Measurements, Status},
-    stopped::Stopped,
+    stopped::{Follower, Stopped},
     withdrawn::Withdrawn,
 };
 
@@ -33,9 +33,6 @@ pub struct BroadcastWrite {
     /// The word.
     pub value: u16,
 }
-
-/// The end that a [drive tells](Drive::follow_stops): the last status, once there is one.
-pub type Follower = tokio::sync::watch::Sender<Option<Status>>;
 
 /// A variable-speed drive on a line.
 ///

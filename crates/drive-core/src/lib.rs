@@ -60,7 +60,7 @@ pub use capabilities::{
     AnswerDelay, Capabilities, LineMismatch, Reaction, StatusBit, Watchdog, WatchdogCapability,
 };
 pub use confirm::{CONFIRMED_WITHIN, Confirming, SETTLED_WITHIN};
-pub use drive::{BroadcastWrite, Drive, Follower};
+pub use drive::{BroadcastWrite, Drive};
 pub use error::{Error, ErrorKind, ExceptionMeaning, Exchange, NEGATIVE_REPLY, Result, SetpointProblem};
 pub use faults::{Fault, FaultEntry, Faults};
 pub use identity::Identity;
@@ -79,7 +79,7 @@ pub use serial::SerialSettings;
 pub use setpoint::{Command, Direction, Setpoint, StopMode};
 pub use state::{Control, State};
 pub use status::{Measurements, RawWord, Status};
-pub use stopped::Stopped;
+pub use stopped::{Follower, Stopped};
 pub use turns::{STATUSES_PER_TURN, Turns};
 pub use units::{Current, Frequency, Percent, Power, Speed, UnitError, Voltage};
 pub use watch::Watch;

@@ -4,6 +4,9 @@ use std::{fmt, time::Duration};
 
 use crate::{motion::Shaft, setpoint::StopMode, state::Control, status::Status};
 
+/// The end that a [drive tells](crate::Drive::follow_stops): the last status, once there is one.
+pub type Follower = tokio::sync::watch::Sender<Option<Status>>;
+
 /// A stop that the drive shows: no run command is in force any more. The motor may still be coming down.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]

@@ -2,10 +2,8 @@
 
 use std::{fmt, time::Duration};
 
-use drive_core::{Frequency, Setpoint, Status};
+use drive_core::{Frequency, Setpoint};
 use tokio::time::Instant;
-
-use crate::snapshot::Timed;
 
 /// Limits of the setpoints that a fleet gives to a drive, besides the drive's own.
 ///
@@ -144,14 +142,6 @@ impl fmt::Display for LimitProblem {
 pub(crate) struct Given {
     pub(crate) setpoint: Setpoint,
     pub(crate) at: Instant,
-}
-
-impl Given {
-    /// Where nobody knows what was given, as behind an order that was dropped or a line that was lost: what the motor turns at.
-    pub(crate) fn shown(status: &Timed<Status>) -> Option<Self> {
-        let frequency = status.value.output_frequency.or(status.value.reference)?;
-        Some(Self { setpoint: frequency.into(), at: status.at })
-    }
 }
 
 impl FrequencyLimits {

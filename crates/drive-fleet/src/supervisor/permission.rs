@@ -7,7 +7,7 @@ use super::{Asker, Job, Supervisor, orders::Active};
 use crate::{
     limits::{Given, LimitProblem},
     outcome::{Order, Refused, Until},
-    snapshot::{Link, WatchdogCheck},
+    snapshot::{Link, Timed, WatchdogCheck},
 };
 
 /// How many orders of one drive may wait.
@@ -234,8 +234,14 @@ impl Supervisor {
 
     fn allow_setpoint(&self, now: Instant, setpoint: Setpoint) -> Result<(), Refused> {
         let moving = self.status.as_ref().filter(|status| !status.value.is_undriven());
-        let last = moving.and_then(|status| self.given.or_else(|| Given::shown(status)));
+        let last = moving.and_then(|status| self.given.or_else(|| shown(status)));
         let allowed = self.settings.limits.allow(now, setpoint, last);
         crate::mutant!("limit-passed", allowed, Ok(())).map_err(Refused::Limit)
     }
+}
+
+/// Where nobody knows what was given, as behind an order that was dropped or a line that was lost: what the motor turns at.
+fn shown(status: &Timed<Status>) -> Option<Given> {
+    let frequency = status.value.output_frequency.or(status.value.reference)?;
+    Some(Given { setpoint: frequency.into(), at: status.at })
 }
