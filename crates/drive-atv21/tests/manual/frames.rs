@@ -354,6 +354,8 @@ async fn command_words_are_those_of_8_4_with_and_without_the_priorities() {
         script.extend([
             ("01 03 FE46 0001", "01 03 02 0004"),
             (&write, &write),
+            // UL, up to which it turns.
+            ("01 03 0012 0001", "01 03 02 1388"),
             ("01 03 FD01 0001", &running),
             ("01 03 FD00 0001", "01 03 02 0000"),
             ("01 03 FE03 0001", "01 03 02 0000"),
@@ -364,8 +366,6 @@ async fn command_words_are_those_of_8_4_with_and_without_the_priorities() {
             // Others of these words have said the same as each other: what is new behind them is asked twice.
             ("01 03 FA00 0001", &held),
             ("01 03 FA00 0001", &held),
-            // UL, up to which it turns.
-            ("01 03 0012 0001", "01 03 02 1388"),
         ]);
         let (line, other_end) = scripted(&script);
         let mut drive = Atv21::new(line.slave(1), bench::address(1)).with_authority(authority);
