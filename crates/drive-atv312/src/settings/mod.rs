@@ -10,6 +10,7 @@ use drive_core::{
     registers::{Register, access::Kind},
 };
 use drive_drivecom::{self as drivecom, StopWord};
+use tokio::time::Instant;
 
 use crate::{
     ramp::Ramp,
@@ -106,6 +107,8 @@ pub(crate) struct Known {
     /// The registers that this drive lacks.
     pub(crate) absent: Absent,
     pub(crate) speeds: Option<(Speed, Speed)>,
+    /// When it was read last whether the drive starts again by itself, `Atr`.
+    pub(crate) restart_at: Option<Instant>,
     /// Whether a status was read since, so that the next one has time for a setting.
     pub(crate) seen: bool,
 }

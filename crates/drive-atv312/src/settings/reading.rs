@@ -1,7 +1,10 @@
 //! The settings and the control variables on the wire: what is read once, what is read anew, and when.
 
+use std::time::Duration;
+
 use drive_core::{Class, Error, ErrorKind, Frequency, Ground, Port, Result, Speed};
 use drive_drivecom::{self as drivecom, Limits};
+use tokio::time::Instant;
 
 use super::{BLOCKS, Block, FOR_A_STOP, Settings};
 use crate::{
@@ -10,6 +13,10 @@ use crate::{
     registers::{CMD, SMIL, TFR, address},
     words::{AccessLevel, ExtendedControl},
 };
+
+/// How long `Atr` is taken for what it was. It is read in so long between two statuses, which costs a line of many drives little, and not
+/// by each of many starts at once, which have no time for one exchange more.
+const RESTART_HOLDS: Duration = Duration::from_secs(30);
 
 impl<P: Port> Atv312<P> {
     /// Bit 9 of `CMI`: one exchange once.
@@ -48,9 +55,20 @@ impl<P: Port> Atv312<P> {
         self.read_again(class, &meanings().collect::<Vec<_>>()).await
     }
 
-    /// The same with what would start the motor again by itself: a start rests on that it does not.
+    /// The same with what would start the motor again by itself, where nobody has looked lately: a start rests on that it does not.
     pub(crate) async fn read_for_a_start(&mut self, class: Class) -> Result<()> {
-        self.read_again(class, &meanings().chain([address::ATR]).collect::<Vec<_>>()).await
+        let restart = self.restart_is_old().then_some(address::ATR);
+        self.read_again(class, &meanings().chain(restart).collect::<Vec<_>>()).await
+    }
+
+    /// Whether somebody at the keypad may have switched the automatic restart on since it was looked at.
+    pub(crate) fn restart_is_old(&self) -> bool {
+        self.known.restart_at.is_none_or(|at| at.elapsed() > RESTART_HOLDS)
+    }
+
+    /// Looks at it again, for whoever watches.
+    pub(crate) async fn look_at_restart(&mut self, class: Class) -> Result<()> {
+        self.read_again(class, &[address::ATR]).await
     }
 
     async fn read_again(&mut self, class: Class, blocks: &[u16]) -> Result<()> {
@@ -109,6 +127,9 @@ impl<P: Port> Atv312<P> {
     /// The words of a block that this drive has. A function that it does not have is assigned to nothing.
     async fn read_block(&mut self, class: Class, (first, count, _): Block) -> Result<Vec<(u16, u16)>> {
         let words = self.known.absent.read(&mut self.registers.at(class), first, count).await?;
+        if first == address::ATR {
+            self.known.restart_at = Some(Instant::now());
+        }
         Ok((first..=u16::MAX).zip(words).filter_map(|(at, word)| Some((at, word?))).collect())
     }
 

@@ -118,10 +118,20 @@ async fn an_automatic_restart_that_was_switched_on_since_the_settings_were_read_
     drive.stop(StopMode::Ramp).await.unwrap();
     machine.wait_until(|seen| !seen.running).await;
     machine.poke(row("Atr").address, 1);
+    // Whoever watches looks at it now and then.
+    watch(&mut *drive, 32).await;
     let error = drive.start(Direction::Forward).await.unwrap_err();
     assert!(matches!(refusal(&error), Some(Refusal::RestartsItself(_))), "{error}");
     machine.poke(row("Atr").address, 0);
+    watch(&mut *drive, 32).await;
     drive.start(Direction::Forward).await.unwrap();
+}
+
+async fn watch(drive: &mut dyn Drive, seconds: u32) {
+    for _ in 0..seconds {
+        tokio::time::sleep(Duration::from_secs(1)).await;
+        drive.status().await.unwrap();
+    }
 }
 
 #[tokio::test(start_paused = true)]
