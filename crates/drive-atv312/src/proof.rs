@@ -36,8 +36,6 @@ pub(crate) enum Look {
     Setting,
     /// What is not known yet of the ramp.
     Ramp,
-    /// `Atr`, now and then.
-    Restart,
     /// What has its turn.
     Turn(usize),
 }
@@ -72,7 +70,7 @@ impl<P: Port> Atv312<P> {
         if self.proof.watch.is_kept() { 2 * (TURNS + self.known.settings.blocks()) } else { 0 }
     }
 
-    fn wanted(&self, words: &FastWords, status: &Status) -> [(Look, bool); 9] {
+    fn wanted(&self, words: &FastWords, status: &Status) -> [(Look, bool); 8] {
         let settings = &self.known.settings;
         let evidence = self.evidence(words);
         let elsewhere = evidence.is_some() && self.told_reference(words) != Told::Yes;
@@ -91,7 +89,6 @@ impl<P: Port> Atv312<P> {
             (Look::Analog, elsewhere && sums),
             (Look::Setting, learns),
             (Look::Ramp, evidence.is_some() && self.known.ramp.can_learn()),
-            (Look::Restart, settings.is_complete() && self.restart_is_old()),
         ]
     }
 
@@ -114,7 +111,6 @@ impl<P: Port> Atv312<P> {
             }
             Look::Setting => self.read_a_setting(class).await,
             Look::Ramp => self.read_ramp(class).await?,
-            Look::Restart => self.look_at_restart(class).await?,
             Look::Turn(turn) if turn % 2 == 0 => self.read_controls(class).await.map(drop)?,
             Look::Turn(turn) => match turn / 2 {
                 0 => self.read_frequency_limits(class).await.map(drop)?,
@@ -131,8 +127,8 @@ impl<P: Port> Atv312<P> {
                 block => self.read_setting_again(class, block - TURNS).await?,
             },
         }
-        // One after the other; and again when its time has come.
-        if !matches!(look, Look::Setting | Look::Ramp | Look::Restart) {
+        // One after the other.
+        if !matches!(look, Look::Setting | Look::Ramp) {
             self.proof.looked(look);
         }
         Ok(())

@@ -302,7 +302,7 @@ impl LineConfig {
     /// the line.
     ///
     /// Behind a [`Gateway`] it ends where the stop is on the drives' line, and what the gateway may be waiting for is in it:
-    /// one question in vain, and one more where it is not known to serve one request at a time.
+    /// one question in vain, and one more where it is not known how many requests it serves at once.
     ///
     /// With [`Echo::Auto`] it includes the one read that finds out about the echo, though that happens only before the
     /// first write after opening.

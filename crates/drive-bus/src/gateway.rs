@@ -36,11 +36,11 @@ impl Gateway {
     /// There is none: what answers is the drive itself.
     pub const NONE: Self = Self { at_once: None, wait: Some(Duration::ZERO) };
 
-    /// What it adds to the wait of a stop: one question in vain, and one more where it is not known to serve one at a time, so that it is
-    /// asked a second while it is at one; where it serves more, both drives may be on one line behind it.
+    /// What it adds to the wait of a stop: one question in vain, and one more where it is not known how many it serves at
+    /// once.
     #[must_use]
     pub fn stop_waits(&self) -> Duration {
-        self.wait.unwrap_or(Self::ASSUMED_WAIT) * if self.at_once == Some(1) { 1 } else { 2 }
+        self.wait.unwrap_or(Self::ASSUMED_WAIT) * if self.at_once.is_some() { 1 } else { 2 }
     }
 }
 

@@ -258,15 +258,6 @@ fn no_order_of_a_gateway_that_was_a_find_is_one_again() {
             "the thirteenth of thirteen stops in vain waited for the shares of all",
         ),
         ("Unknown", "hcdhjgde", "a timeout of a second, learned behind what a lost connection had asked"),
-        ("Lines", "gcgbdjiae", "the same behind a dead drive of its line"),
-        ("Lines", "aciijhhgiahjabjgjdfgj", "the same behind what three lost connections had asked"),
-        (
-            "Lines",
-            "bcbiffee",
-            "taken to wait for more than twice as long, behind a dead drive of the same line",
-        ),
-        ("Lines", "ebdgcjjj", "the same"),
-        ("Lines", "gcegbigiijffje", "the same, of what was given up when all before it was over"),
     ] {
         assert_eq!(Model::named("gateway").expect("it is one").again(setting, steps), Ok(()), "{what}");
     }

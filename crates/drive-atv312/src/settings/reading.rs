@@ -14,8 +14,7 @@ use crate::{
     words::{AccessLevel, ExtendedControl},
 };
 
-/// How long `Atr` is taken for what it was. It is read in so long between two statuses, which costs a line of many drives little, and not
-/// by each of many starts at once, which have no time for one exchange more.
+/// How long `Atr` is taken for what it was: many starts behind each other have no time for one exchange more each.
 const RESTART_HOLDS: Duration = Duration::from_secs(30);
 
 impl<P: Port> Atv312<P> {
@@ -57,18 +56,9 @@ impl<P: Port> Atv312<P> {
 
     /// The same with what would start the motor again by itself, where nobody has looked lately: a start rests on that it does not.
     pub(crate) async fn read_for_a_start(&mut self, class: Class) -> Result<()> {
-        let restart = self.restart_is_old().then_some(address::ATR);
+        let is_old = self.known.restart_at.is_none_or(|at| at.elapsed() > RESTART_HOLDS);
+        let restart = is_old.then_some(address::ATR);
         self.read_again(class, &meanings().chain(restart).collect::<Vec<_>>()).await
-    }
-
-    /// Whether somebody at the keypad may have switched the automatic restart on since it was looked at.
-    pub(crate) fn restart_is_old(&self) -> bool {
-        self.known.restart_at.is_none_or(|at| at.elapsed() > RESTART_HOLDS)
-    }
-
-    /// Looks at it again, for whoever watches.
-    pub(crate) async fn look_at_restart(&mut self, class: Class) -> Result<()> {
-        self.read_again(class, &[address::ATR]).await
     }
 
     async fn read_again(&mut self, class: Class, blocks: &[u16]) -> Result<()> {

@@ -118,7 +118,7 @@ async fn an_automatic_restart_that_was_switched_on_since_the_settings_were_read_
     drive.stop(StopMode::Ramp).await.unwrap();
     machine.wait_until(|seen| !seen.running).await;
     machine.poke(row("Atr").address, 1);
-    // Whoever watches looks at it now and then.
+    // Its last look is older than a start takes it for.
     watch(&mut *drive, 32).await;
     let error = drive.start(Direction::Forward).await.unwrap_err();
     assert!(matches!(refusal(&error), Some(Refusal::RestartsItself(_))), "{error}");

@@ -56,12 +56,10 @@ impl<C> Master<C> {
             && self
                 .schedule
                 .any(|other| other.slave == entry.slave && other.terms.replaces == entry.terms.replaces);
-        // The gateway has not given it up yet, and asks as often as it does. One that answers as a rule is late, and soon heard: it is asked
-        // again where that is soon, and else told as silent before its next attempt has had its turn.
-        let soon = self.stations.get(&entry.slave).filter(|station| station.timeout.is_learned());
-        let soon = now + soon.map_or(Duration::ZERO, |station| station.timeout.ceiling());
+        // The gateway has not given it up yet, and asks as often as it does. One that answers as a rule is late, and soon heard.
+        let was_heard = self.stations.get(&entry.slave).is_some_and(|station| station.timeout.is_learned());
         let is_asked_still =
-            !entry.work.is_write && self.far_end.gate(entry.slave, true).is_some_and(|gate| gate > soon);
+            !entry.work.is_write && !was_heard && self.far_end.gate(true).is_some_and(|gate| gate > now);
         entry.work.attempts < self.config.retries
             && entry.expires().is_none_or(|expires| now < expires)
             && !(offline

@@ -7,12 +7,8 @@
 //! - a far end of which it is **not known** whether it does more than one thing at once is asked one thing more: a read, of a
 //!   drive that answers. Its answer comes at once, then it does; or behind what was owed, which shows how long that took;
 //! - one that **does no more** is asked nothing, until what is owed is over;
-//! - one that **does more** may have several lines behind it, on each of which one drive waits for the other ([`apart`]): of what is
-//!   owed no more than two can be on one of them, as far as is known, so that a stop waits for no more than these;
 //! - a stop is sent, whatever is owed.
 
-mod apart;
-mod gate;
 mod turn;
 
 use std::{iter, time::Duration};
@@ -25,12 +21,17 @@ use crate::{
     stats::{FarEndStats, SecondConnection, WaitIs},
 };
 
-use apart::Apart;
 pub(super) use turn::{Asked, Place};
 use turn::{Owed, Turn, waited};
 
+/// Of so many questions in vain one asks again whether a far end that does one thing at a time still does.
+const ASK_AGAIN: u32 = 8;
+
 /// What is owed at the most: one question of each of the drives of a long line.
 const MOST: usize = 32;
+
+/// A gateway is still at what it was asked so short a time ago, unless it waits for less than twice that.
+const SOON: Duration = Duration::from_secs(1);
 
 /// How often what is waited for may double while nothing proves that the far end is done.
 const DOUBLINGS: u32 = 2;
@@ -45,8 +46,6 @@ pub(super) struct FarEnd {
     serves: usize,
     /// And no more.
     exactly: bool,
-    /// Which drives wait for each other, as far as was seen.
-    apart: Apart,
     /// How long it was seen to wait.
     seen: Option<Duration>,
     /// When it was last done with something that was owed.
@@ -67,7 +66,6 @@ impl FarEnd {
             owed: Vec::new(),
             serves: at_once.unwrap_or(1).max(1),
             exactly: at_once.is_some(),
-            apart: Apart::new(at_once),
             seen: None,
             free_from: None,
             unproven: 0,
@@ -81,16 +79,9 @@ impl FarEnd {
         self.gateway.is_some()
     }
 
-    /// Whether a question in vain costs others its whole wait, as far as is known: it does one thing at a time, or some of its drives
-    /// wait for each other.
-    pub(super) fn holds_others_up(&self) -> bool {
-        self.gateway.is_some() && (self.serves < 2 || self.apart.waiting() > 0.0)
-    }
-
-    /// What a question in vain costs the others, as far as is known: where it does one thing at a time its whole wait, else that of as many
-    /// of them as were seen to wait for each other.
-    pub(super) fn in_vain_costs(&self) -> Duration {
-        if self.serves < 2 { self.wait() } else { self.wait().mul_f64(self.apart.waiting()) }
+    /// Whether it does one thing at a time, as far as is known: then a question in vain costs everybody its whole wait.
+    pub(super) const fn holds_others_up(&self) -> bool {
+        self.gateway.is_some() && self.serves < 2
     }
 
     /// How long it waits for a drive that does not answer: seen, set, or assumed.
@@ -99,10 +90,11 @@ impl FarEnd {
         self.seen.or(gateway.wait).unwrap_or(Gateway::ASSUMED_WAIT)
     }
 
-    /// What it adds to the wait of a stop: one question in vain, and one more where it is not known to do one thing at a time.
+    /// What it adds to the wait of a stop: one question in vain, and one more where it is not yet known whether it does
+    /// more than one thing at once.
     pub(super) fn stop_waits(&self) -> Duration {
         let Some(gateway) = self.gateway else { return Duration::ZERO };
-        let questions = if self.exactly && self.serves < 2 { 1 } else { 2 };
+        let questions = if self.exactly || self.serves > 1 { 1 } else { 2 };
         self.wait().max(gateway.wait.unwrap_or_default()) * questions
     }
 
@@ -136,18 +128,14 @@ impl FarEnd {
             return;
         }
         // What it was done with since then is not before it any more.
+        let was_done = self.free_from.is_some_and(|free| free > asked.at);
+        let Place { turn, begins } = if was_done { self.place(asked.at) } else { asked.place };
         let in_turn = self.serves_in_turn();
-        let was_done = in_turn && self.free_from.is_some_and(|free| free > asked.at);
-        let Place { turn, begins } = if was_done { self.place(asked.at, asked.slave) } else { asked.place };
         let before = self.owed.iter().map(|owed| owed.until).max().filter(|_| in_turn);
         let wait = crate::mutant!("far-end-gives-up-early", self.wait() * 5 / 4, self.wait() / 4);
         // What stood before it was waited for as long as it might take, and its end was proved by nothing: it is not doubled once more.
         let is_behind_what_is_over = before.is_none() && begins.is_some();
-        let limit = if is_behind_what_is_over || !in_turn {
-            wait
-        } else {
-            wait * (1 << self.unproven.min(DOUBLINGS))
-        };
+        let limit = if is_behind_what_is_over { wait } else { wait * (1 << self.unproven.min(DOUBLINGS)) };
         // It came to it when it was done with what it was at, which may be later than it was asked.
         let begins = before.max(begins).or(self.free_from.filter(|_| in_turn));
         let until = begins.unwrap_or(asked.at).max(asked.at) + limit;
@@ -155,8 +143,7 @@ impl FarEnd {
         if self.owed.len() >= MOST {
             self.owed.remove(0);
         }
-        let (over_a_lost_port, passed) = (false, false);
-        self.owed.push(Owed { slave, number, shape, asked: at, until, turn, over_a_lost_port, passed });
+        self.owed.push(Owed { slave, number, shape, asked: at, until, turn, over_a_lost_port: false });
         self.in_vain = self.in_vain.saturating_add(1);
     }
 
@@ -165,13 +152,12 @@ impl FarEnd {
         crate::mutant!("far-end-serves-side-by-side", self.serves < 2, false)
     }
 
-    /// Behind what that stands which this slave is asked at `at`.
-    pub(super) fn place(&self, at: Instant, slave: u8) -> Place {
+    /// Behind what that stands which is asked at `at`.
+    pub(super) fn place(&self, at: Instant) -> Place {
         let in_turn = self.serves_in_turn();
         let turn = match self.owed.last().filter(|_| in_turn) {
             Some(before) => before.turn.map(|turn| Turn { place: turn.place.saturating_add(1), ..turn }),
             None if self.left_until.is_some_and(|until| at < until) => None,
-            None if !self.owed.iter().all(|owed| self.apart.was_seen(owed.slave, slave)) => None,
             None => {
                 let free = self.free_from.filter(|_| in_turn).map_or(at, |free| free.max(at));
                 let free_from = crate::mutant!("far-end-waits-since-it-was-asked", free, at);
@@ -181,31 +167,59 @@ impl FarEnd {
         Place { turn, begins: self.owed.iter().map(|owed| owed.until).max().filter(|_| in_turn) }
     }
 
-    /// What was sent to this slave behind `behind` questions in vain was answered: at once, or only when its usual time was over. Gives
+    /// Until when a request waits. `reads`: it is a read of a drive that answers, or of any where none does.
+    pub(super) fn gate(&self, reads: bool) -> Option<Instant> {
+        let owed = self.owed.len();
+        if owed == 0 || owed < self.serves {
+            return None;
+        }
+        let asks_whether = crate::mutant!(
+            "far-end-asked-one-more",
+            !self.exactly || self.in_vain.is_multiple_of(ASK_AGAIN) && self.gateway_may_change(),
+            true
+        );
+        if asks_whether && reads && owed == self.serves {
+            return None;
+        }
+        self.owed.iter().map(|owed| owed.until).min()
+    }
+
+    fn gateway_may_change(&self) -> bool {
+        self.gateway.is_some_and(|gateway| gateway.at_once.is_none())
+    }
+
+    /// How much longer than usual the answer to what is sent at `now` may take, because it waits behind what is owed.
+    pub(super) fn held_up(&self, now: Instant) -> Duration {
+        let last = self.owed.iter().map(|owed| owed.until).max().filter(|_| self.owed.len() >= self.serves);
+        last.map_or(Duration::ZERO, |last| last.saturating_duration_since(now))
+    }
+
+    /// What was sent behind `behind` questions in vain was answered: at once, or only when its usual time was over. Gives
     /// the slaves that the far end has waited for in vain to the end.
-    pub(super) fn answered(&mut self, now: Instant, slave: u8, behind: usize, at_once: bool) -> Vec<u8> {
+    pub(super) fn answered(&mut self, now: Instant, behind: usize, at_once: bool) -> Vec<u8> {
         self.unproven = 0;
         if behind == 0 || self.gateway.is_none() {
             return Vec::new();
         }
         if at_once {
-            self.passed_by(now, slave);
+            // Later it may be done with what was asked, though nobody was told; with what a lost connection has asked, at once.
+            let soon = SOON.min(self.wait() / 2);
+            let is_recent = |owed: &Owed| now.saturating_duration_since(owed.asked) < soon;
+            let is_busy = crate::mutant!(
+                "far-end-done-is-busy",
+                self.owed.iter().all(|owed| is_recent(owed) && !owed.over_a_lost_port),
+                true
+            );
+            if is_busy && self.owed.len() >= behind && behind >= self.serves && self.gateway_may_change() {
+                self.serves = behind + 1;
+                self.exactly = false;
+            }
             return Vec::new();
-        }
-        if self.serves > 1 && !self.is_full() && self.owed.iter().all(|owed| owed.passed) {
-            // Others have their answers meanwhile: it is one of several lines that is held up.
-            let Self { owed, apart, .. } = self;
-            let over: Vec<_> = owed.extract_if(.., |owed| !apart.is(owed.slave, slave)).collect();
-            over.iter().for_each(|owed| apart.saw(owed.slave, slave, false));
-            return over.iter().filter_map(Owed::given_up).collect();
         }
         if self.gateway_may_change() {
             // Behind two it may have waited for one after the other.
             self.serves = self.serves.min(behind);
             self.exactly = true;
-            if self.serves < 2 {
-                self.apart = Apart::default();
-            }
         }
         self.done_with_all(now)
     }
@@ -243,9 +257,6 @@ impl FarEnd {
         let owed = self.owed.remove(at - before.len());
         let mut given_up: Vec<_> = before.iter().filter_map(Owed::given_up).collect();
         let mut over = before;
-        if !nobody && owed.turn.is_none() && self.serves > 1 {
-            self.apart.somebody_waited();
-        }
         if nobody {
             given_up.extend(owed.given_up());
             over.push(owed);
@@ -300,8 +311,7 @@ impl FarEnd {
         if let Some(asked) = under_way.filter(|_| goes_on) {
             self.owe(asked);
         } else if let Some(asked) = under_way {
-            // Each behind those that were left there before it.
-            self.left_until = self.left_until.max(Some(asked.at)).map(|since| since + self.wait() * 5 / 4);
+            self.left_until = Some(asked.at + self.wait() * 5 / 4);
         }
         if crate::mutant!("far-end-free-after-a-loss", false, true) {
             self.owed.clear();

@@ -85,7 +85,7 @@ impl<C> Master<C> {
                         let behind = flight.sent.filter(|_| flight.behind > 0);
                         let own = behind.map_or(took, |sent| took.min(usual(sent)));
                         let held_up = crate::mutant!("stop-rests-for-others", own, took);
-                        self.offline.stop_failed(now, slave, held_up.max(self.far_end.in_vain_costs()));
+                        self.offline.stop_failed(now, slave, held_up.max(self.in_vain()));
                     }
                     let waited = flight.sent.map_or(Duration::ZERO, |sent| {
                         sent.timeout.min(now.saturating_duration_since(sent.end))
@@ -102,7 +102,7 @@ impl<C> Master<C> {
             },
             Purpose::Call(None) => self.station(slave).stats.outcomes.withdrawn += 1,
             Purpose::Probe => {
-                let held = if answered { Duration::ZERO } else { self.far_end.in_vain_costs() };
+                let held = if answered { Duration::ZERO } else { self.in_vain() };
                 let long = flight.question == Question::Long && held.is_zero();
                 let took = took.max(held) + self.config.silence();
                 self.probing.ended(now, took, answered, long, self.offline.len());

@@ -138,9 +138,7 @@ impl<C> Master<C> {
             **slave != 0 && station.timeout.is_learned() && station.doubt.over().is_some()
         });
         let whom = asks.map(|(slave, _)| *slave).min_by_key(|slave| self.offline.contains(*slave));
-        match whom
-            .filter(|slave| !opened.asked && self.far_end.gate(*slave, false).is_none_or(|gate| gate <= now))
-        {
+        match whom.filter(|_| !opened.asked && self.far_end.gate(false).is_none()) {
             Some(slave) => First::Ask(slave),
             None => {
                 self.fresh.opened = None;

@@ -1,5 +1,7 @@
 //! What an exchange shows of its slave, and of what stands between.
 
+use std::time::Duration;
+
 use drive_core::{Class, PortError};
 use tokio::time::Instant;
 
@@ -26,6 +28,11 @@ impl<C> Master<C> {
         }
     }
 
+    /// How long a question in vain holds everybody up.
+    pub(super) fn in_vain(&self) -> Duration {
+        if self.far_end.holds_others_up() { self.far_end.wait() } else { Duration::ZERO }
+    }
+
     /// The far end may still be at it.
     pub(super) fn owe(&mut self, flight: &Flight<C>) {
         self.unsettle(self.exchange_end, flight);
@@ -50,7 +57,7 @@ impl<C> Master<C> {
         let took = self.exchange.took();
         let confuses = self.exchange.confuses_late_answers();
         let at_once = flight.sent.is_none_or(|sent| now <= sent.usually_by);
-        let given_up = self.far_end.answered(now, flight.slave, flight.behind, at_once);
+        let given_up = self.far_end.answered(now, flight.behind, at_once);
         self.nobody_answered(now, given_up);
         self.second.settled(now, flight.slave, flight.asked_at);
         let station = self.station(flight.slave);

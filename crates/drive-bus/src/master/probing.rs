@@ -89,7 +89,7 @@ impl<C> Master<C> {
     /// anything may wait before it has aged: on a full line a drive that is back would never be noticed.
     pub(super) fn next_probe(&self, now: Instant) -> Option<(u8, Instant)> {
         let (slave, at) = self.due_probe(now)?;
-        let at = self.far_end.gate(slave, false).map_or(at, |gate| gate.max(at));
+        let at = self.far_end.gate(false).map_or(at, |gate| gate.max(at));
         // One that was heard late has its pause as well.
         let at =
             self.stations.get(&slave).and_then(|station| station.ready_at).map_or(at, |ready| ready.max(at));
@@ -111,13 +111,9 @@ impl<C> Master<C> {
     }
 
     fn somebody_answers(&self) -> bool {
-        self.living().next().is_some()
-    }
-
-    /// Those that have answered and are not off-line.
-    pub(super) fn living(&self) -> impl Iterator<Item = u8> {
-        let learned = self.stations.iter().filter(|(_, station)| station.timeout.is_learned());
-        learned.map(|(slave, _)| *slave).filter(|slave| !self.offline.contains(*slave))
+        self.stations
+            .iter()
+            .any(|(slave, station)| station.timeout.is_learned() && !self.offline.contains(*slave))
     }
 
     /// Whom to probe and when, if the line were his.

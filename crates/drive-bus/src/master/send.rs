@@ -288,13 +288,13 @@ impl<C> Master<C> {
         let timeout = flight.patience;
         let characters = self.config.characters(self.config.answer_len(answer::likely_len(&flight.request)));
         let usually_by = end + timeout + characters;
-        let answer_by = usually_by + self.far_end.held_up(end, flight.slave);
+        let answer_by = usually_by + self.far_end.held_up(end);
         flight.sent = Some(Sent {
             end,
             timeout,
             answer_by,
             usually_by,
-            place: self.far_end.place(end, flight.slave),
+            place: self.far_end.place(end),
             unanswered_until: unanswered.then(|| end + self.config.broadcast_pause),
         });
         self.exchange.handle_sent(end - taken_in, answer_by);

@@ -53,7 +53,7 @@ impl<C> Waits<'_, C> {
         });
         let share = if is_stop { self.offline.stop_at(entry.slave) } else { None };
         let owes = !goes_at_once && self.far_end.owes() > 0;
-        let gate = if owes { self.far_end.gate(entry.slave, self.proves_something(entry)) } else { None };
+        let gate = if owes { self.far_end.gate(self.proves_something(entry)) } else { None };
         let second = self.second.holds(entry.slave).filter(|_| entry.work.is_write && !is_stop);
         aside.max(doubt).max(share).max(gate).max(second).filter(|until| *until > now)
     }

@@ -1,6 +1,5 @@
 //! Small cases of a line behind a gateway that serves one question after the other and is at each until it is answered or its own wait is
-//! over, on one line of its own or on several: every sequence of so many steps of what is asked, who dies, and what becomes of the
-//! connection.
+//! over: every sequence of so many steps of what is asked, who dies, and what becomes of the connection.
 
 use std::{
     collections::{BTreeMap, BTreeSet, VecDeque},
@@ -23,7 +22,7 @@ pub(crate) const MODEL: Model = Model {
     name: "gateway",
     part: "model of a gateway",
     against_plants: "model of a gateway, against planted defects",
-    settings: &["Tells", "Silent", "Unknown", "Lines", "Apart"],
+    settings: &["Tells", "Silent", "Unknown"],
     steps: || names(&Step::ALL),
     lives: |setting, steps, _| {
         let steps: Vec<Step> = steps.iter().map(|step| Step::ALL[*step]).collect();
@@ -104,20 +103,16 @@ pub enum Setting {
     Silent,
     /// It says that nobody answered, and nothing is known of it.
     Unknown,
-    /// The same, and drive 2 has a line of its own behind it.
-    Lines,
-    /// It says nothing, nothing is known of it, and each drive has a line of its own.
-    Apart,
 }
 
 impl Setting {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Tells, Self::Silent, Self::Unknown, Self::Lines, Self::Apart];
+    pub const ALL: [Self; 3] = [Self::Tells, Self::Silent, Self::Unknown];
 
     fn config(self) -> LineConfig {
         let gateway = match self {
-            Self::Tells | Self::Silent => Gateway { at_once: Some(1), wait: Some(WAIT) },
-            Self::Unknown | Self::Lines | Self::Apart => Gateway::default(),
+            Self::Unknown => Gateway::default(),
+            _ => Gateway { at_once: Some(1), wait: Some(WAIT) },
         };
         LineConfig {
             gateway: Some(gateway),
@@ -126,17 +121,6 @@ impl Setting {
             offline_after: 3,
             retries: 0,
             ..LineConfig::modbus_tcp("gateway")
-        }
-    }
-}
-
-impl Setting {
-    /// On which of its lines a drive is.
-    const fn line_of(self, slave: u8) -> u8 {
-        match self {
-            Self::Tells | Self::Silent | Self::Unknown => 0,
-            Self::Lines => (slave == 2) as u8,
-            Self::Apart => slave,
         }
     }
 }
@@ -172,9 +156,9 @@ struct World {
     now: Instant,
     calls: BTreeMap<u32, Call>,
     connection: u32,
-    /// What waits in the gateway, and what each of its lines is at, until when, and whether the drive has heard it.
+    /// What waits in the gateway, and what it is at, until when, and whether the drive has heard it.
     queue: VecDeque<Question>,
-    at: BTreeMap<u8, (Question, Instant, bool)>,
+    at: Option<(Question, Instant, bool)>,
     dead: BTreeSet<u8>,
     /// When each drive was asked for last, whether that was taken or refused.
     wanted: BTreeMap<u8, Instant>,
@@ -196,7 +180,7 @@ impl World {
             calls: BTreeMap::new(),
             connection: 0,
             queue: VecDeque::new(),
-            at: BTreeMap::new(),
+            at: None,
             dead: BTreeSet::from([3]),
             wanted: BTreeMap::new(),
             number: 0,
@@ -263,11 +247,12 @@ impl World {
         self.run_for(Duration::ZERO)
     }
 
-    /// It goes on with what waits for a line that is free.
+    /// It goes on with what waits.
     fn next_question(&mut self) -> Held {
-        let line = |question: &Question| self.setting.line_of(question.slave);
-        let next = self.queue.iter().position(|question| !self.at.contains_key(&line(question)));
-        let Some(question) = next.and_then(|next| self.queue.remove(next)) else { return Ok(()) };
+        if self.at.is_some() {
+            return Ok(());
+        }
+        let Some(question) = self.queue.pop_front() else { return Ok(()) };
         let lives = !self.dead.contains(&question.slave);
         let takes = if lives { RESPONSE } else { WAIT };
         let first = self.calls.values().find(|call| call.pdu == question.pdu && call.slave == question.slave);
@@ -280,7 +265,7 @@ impl World {
         {
             return Err("a stop is on the drives' line within the printed bound");
         }
-        self.at.insert(self.setting.line_of(question.slave), (question, self.now + takes, lives));
+        self.at = Some((question, self.now + takes, lives));
         Ok(())
     }
 
@@ -290,8 +275,7 @@ impl World {
 
     fn knows_no_more_than_there_is(&self) -> Held {
         let Some(far_end) = self.far_end() else { return Err("there is a gateway") };
-        let is_in_turn = !matches!(self.setting, Setting::Lines | Setting::Apart);
-        if is_in_turn && far_end.at_once > 1 {
+        if far_end.at_once > 1 {
             return Err("one that does one thing at a time is not taken for one that does more");
         }
         // When it was done with what it says nothing of nobody knows, so that two may be taken for one: never later than that. Of what a
@@ -355,19 +339,18 @@ impl Clocked for World {
 
     /// When the gateway is done with what it is at.
     fn next(&self) -> Option<Instant> {
-        self.at.values().map(|(_, done, _)| *done).min()
+        self.at.as_ref().map(|(_, done, _)| *done)
     }
 
     fn happens(&mut self) -> Held {
-        let line = self.at.iter().min_by_key(|(_, (_, done, _))| *done).map(|(line, _)| *line);
-        let Some((question, _, answers)) = line.and_then(|line| self.at.remove(&line)) else { return Ok(()) };
+        let Some((question, _, answers)) = self.at.take() else { return Ok(()) };
         let Question { transaction: [a, b], slave, pdu, connection } = question;
         super::trace(
             self.now,
             format_args!("<- {slave}: {pdu:02X?}, answered: {answers}, of connection {connection}"),
         );
         let answer = match (answers, self.setting) {
-            (false, Setting::Silent | Setting::Apart) => None,
+            (false, Setting::Silent) => None,
             (false, _) => Some(vec![pdu[0] | 0x80, 0x0B]),
             (true, _) if pdu[0] == 3 => {
                 self.number += 1;
@@ -391,8 +374,8 @@ impl Clocked for World {
         let [a, b, 0, 0, _, _, slave, pdu @ ..] = frame else { return Err("it is a frame of Modbus TCP") };
         super::trace(self.now, format_args!("-> {slave}: {pdu:02X?}, {} before it", self.queue.len()));
         let is_stop = matches!(pdu, [6, 0, at, ..] if u16::from(*at) == STOP);
-        let is_known = matches!(self.setting, Setting::Tells | Setting::Silent);
-        if is_known && !is_stop && !self.at.is_empty() {
+        let is_known = self.setting != Setting::Unknown;
+        if is_known && !is_stop && self.at.is_some() {
             return Err(
                 "a gateway that does one thing at a time is given nothing but a stop while it is at a question",
             );

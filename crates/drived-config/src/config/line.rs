@@ -69,7 +69,7 @@ settings! {
         |to, said| to.segments = within(*said, 1..=u8::MAX, ": one, and one more for each repeater")?;
     /// what stands between the port and the drives: `"none"` where each drive answers for itself, else how long it waits for a
     /// drive that does not answer, as `"3x1s"` for three attempts of a second, with `/N` behind it where it serves N requests at
-    /// once. A stop waits for that, and with `/N` for twice as long; also `gateway=3x1s` behind the port
+    /// once. A stop waits for that; also `gateway=3x1s` behind the port
     gateway: Parsed<Gateway> = "unknown over TCP: 3 s are assumed, and a stop may wait twice; none on a serial port";
     /// how many connections the far end grants this line at once, 1 or 2: a stop takes the second while the first waits for a drive
     /// that does not answer; also `connections=2` behind the port

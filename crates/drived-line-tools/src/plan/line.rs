@@ -96,10 +96,10 @@ impl PlannedLine {
             ),
             (Some(_), Some(wait)) => format!(
                 "{waits} of a stop's wait are the gateway's, which waits {wait:?} for a drive that does not answer{}",
-                match gateway.at_once {
-                    Some(1) => "",
-                    Some(_) => "; behind it one drive may wait for another of its line, so twice",
-                    None => "; how many requests it serves at once is not said, so twice",
+                if gateway.at_once.is_some() {
+                    ""
+                } else {
+                    "; how many requests it serves at once is not said, so twice"
                 }
             ),
         };

@@ -14,7 +14,7 @@ fn in_turn() -> (Instant, FarEnd) {
 }
 
 fn asked(far: &FarEnd, slave: u8, number: u16, at: Instant) -> Asked {
-    Asked { slave, number: Some(number), shape: Shape::ANY, at, place: far.place(at, slave) }
+    Asked { slave, number: Some(number), shape: Shape::ANY, at, place: far.place(at) }
 }
 
 fn owe(far: &mut FarEnd, slave: u8, number: u16, at: Instant) {
@@ -25,29 +25,29 @@ fn owe(far: &mut FarEnd, slave: u8, number: u16, at: Instant) {
 fn nothing_is_owed_where_nothing_is_in_between() {
     let mut far = FarEnd::new(None);
     owe(&mut far, 1, 1, Instant::now());
-    assert_eq!((far.owes(), far.gate(9, true), far.stop_waits()), (0, None, Duration::ZERO));
+    assert_eq!((far.owes(), far.gate(true), far.stop_waits()), (0, None, Duration::ZERO));
 }
 
 #[test]
 fn one_living_drive_is_read_to_see_and_nothing_is_written_meanwhile() {
     let (now, mut far) = unknown();
     owe(&mut far, 1, 1, now);
-    assert_eq!(far.gate(9, true), None);
-    assert!(far.gate(9, false).is_some());
+    assert_eq!(far.gate(true), None);
+    assert!(far.gate(false).is_some());
     owe(&mut far, 2, 2, now);
-    assert!(far.gate(9, true).is_some(), "two are enough");
+    assert!(far.gate(true).is_some(), "two are enough");
 }
 
 #[test]
 fn what_is_answered_at_once_beside_a_question_in_vain_shows_that_it_does_more_at_once() {
     let (now, mut far) = unknown();
     owe(&mut far, 1, 1, now);
-    assert!(far.answered(now + 20 * MS, 9, 1, true).is_empty());
-    assert_eq!((far.gate(9, false), far.held_up(now, 9)), (None, Duration::ZERO));
+    assert!(far.answered(now + 20 * MS, 1, true).is_empty());
+    assert_eq!((far.gate(false), far.held_up(now)), (None, Duration::ZERO));
     assert!(!far.holds_others_up());
     owe(&mut far, 3, 2, now);
-    assert!(far.gate(9, false).is_some(), "of three at once nothing is known");
-    assert_eq!(far.gate(9, true), None);
+    assert!(far.gate(false).is_some(), "of three at once nothing is known");
+    assert_eq!(far.gate(true), None);
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn an_answer_at_once_when_the_far_end_may_be_done_says_nothing_of_how_much_it_do
     let (now, mut far) = unknown();
     owe(&mut far, 1, 1, now);
     // A stop, sent when the gateway had given up without a word.
-    assert!(far.answered(now + 3_200 * MS, 9, 1, true).is_empty());
+    assert!(far.answered(now + 3_200 * MS, 1, true).is_empty());
     assert!(far.holds_others_up());
     assert_eq!(far.stop_waits(), 2 * Gateway::ASSUMED_WAIT);
 }
@@ -65,7 +65,7 @@ fn an_answer_behind_two_questions_in_vain_does_not_show_that_two_are_served_at_o
     let (now, mut far) = unknown();
     owe(&mut far, 1, 1, now);
     owe(&mut far, 2, 2, now);
-    assert_eq!(far.answered(now + 6 * SECOND, 9, 2, false), [1, 2]);
+    assert_eq!(far.answered(now + 6 * SECOND, 2, false), [1, 2]);
     assert!(far.holds_others_up());
     assert_eq!((far.wait(), far.stop_waits()), (3 * SECOND, 3 * SECOND));
 }
@@ -75,10 +75,10 @@ fn an_answer_behind_a_question_in_vain_shows_how_long_that_took_and_that_it_does
     let (now, mut far) = unknown();
     assert_eq!(far.stop_waits(), 2 * Gateway::ASSUMED_WAIT);
     owe(&mut far, 1, 1, now);
-    assert_eq!(far.answered(now + 2 * SECOND, 9, 1, false), [1]);
+    assert_eq!(far.answered(now + 2 * SECOND, 1, false), [1]);
     assert_eq!((far.wait(), far.stop_waits(), far.owes()), (2 * SECOND, 2 * SECOND, 0));
     owe(&mut far, 1, 3, now + 3 * SECOND);
-    assert_eq!(far.gate(9, true), Some(now + 5_500 * MS));
+    assert_eq!(far.gate(true), Some(now + 5_500 * MS));
     assert!(far.expired(now + 5_400 * MS).is_empty());
     assert_eq!(far.expired(now + 5_500 * MS), [1]);
 }
@@ -122,7 +122,7 @@ fn what_waited_in_the_gateway_is_owed_from_when_the_gateway_came_to_it() {
     // A stop is sent behind it; the gateway says after a second that nobody answered, and only then comes to the stop.
     assert_eq!(far.heard(now + SECOND, 3, Some(1), Shape::ANY, true), Some(vec![3]));
     owe(&mut far, 4, 2, now + 300 * MS);
-    assert_eq!(far.gate(9, false), Some(now + 2_250 * MS));
+    assert_eq!(far.gate(false), Some(now + 2_250 * MS));
 }
 
 #[test]
@@ -133,7 +133,7 @@ fn what_was_waited_for_behind_what_can_no_longer_come_has_waited_for_that_too() 
     }
     assert_eq!(far.expired(now + 2_500 * MS), [3, 4]);
     // Each was waited for a second: the answer behind the third comes when three are over.
-    assert_eq!(far.answered(now + 3 * SECOND, 9, 1, false), [5]);
+    assert_eq!(far.answered(now + 3 * SECOND, 1, false), [5]);
     assert_eq!(far.wait(), SECOND);
 }
 
@@ -145,7 +145,7 @@ fn what_was_given_up_when_all_before_it_was_over_has_waited_behind_it_all_the_sa
     assert_eq!(far.expired(now + 1_250 * MS), [3]);
     far.owe(behind);
     // Two seconds are over: both were waited for.
-    assert_eq!(far.answered(now + 2 * SECOND, 9, 1, false), [4]);
+    assert_eq!(far.answered(now + 2 * SECOND, 1, false), [4]);
     assert_eq!(far.wait(), SECOND);
 }
 
@@ -210,7 +210,7 @@ fn what_a_lost_connection_has_asked_says_nothing_of_its_slave_nor_of_how_long_a_
         if nobody {
             assert_eq!(far.heard(now + SECOND, 3, Some(2), Shape::ANY, true), Some(vec![3]));
         } else {
-            assert_eq!(far.answered(now + SECOND, 9, 2, false), [3]);
+            assert_eq!(far.answered(now + SECOND, 2, false), [3]);
         }
         assert_eq!(far.wait(), SECOND, "{nobody}: not half of it");
     }
@@ -222,7 +222,7 @@ fn a_lost_connection_ends_nothing_that_a_gateway_is_at() {
     owe(&mut far, 3, 1, now);
     far.lost(Some(asked(&far, 1, 2, now + 300 * MS)));
     assert_eq!(far.owes(), 2);
-    assert_eq!(far.gate(9, true), Some(now + 1_250 * MS));
+    assert_eq!(far.gate(true), Some(now + 1_250 * MS));
 }
 
 #[test]
@@ -242,69 +242,10 @@ fn while_nothing_proves_that_it_is_done_it_is_asked_less_and_less() {
     let mut limits = Vec::new();
     for number in 0..4 {
         owe(&mut far, 1, number, now);
-        let until = far.gate(9, false).expect("it is owed");
+        let until = far.gate(false).expect("it is owed");
         limits.push(until - now);
         now = until;
         assert_eq!(far.expired(now), [1]);
     }
     assert_eq!(limits, [1_250 * MS, 2_500 * MS, 5_000 * MS, 5_000 * MS]);
-}
-
-/// One that does several things at once, of which more is not known.
-fn side_by_side() -> (Instant, FarEnd) {
-    let (now, mut far) = unknown();
-    owe(&mut far, 1, 1, now);
-    far.answered(now + 20 * MS, 2, 1, true);
-    (now, far)
-}
-
-#[test]
-fn of_two_drives_of_which_one_was_answered_only_behind_the_other_one_is_owed_at_a_time() {
-    let (now, mut far) = side_by_side();
-    // Nobody knows on whose line it is.
-    assert_eq!(far.gate(3, true), None);
-    assert_eq!(far.answered(now + 3 * SECOND, 3, 1, false), [1]);
-    owe(&mut far, 1, 2, now + 5 * SECOND);
-    far.answered(now + 5_020 * MS, 2, 1, true);
-    assert_eq!(far.gate(2, false), None, "it has a line of its own");
-    assert_eq!((far.gate(3, true), far.gate(3, false)), (Some(now + 8_750 * MS), Some(now + 8_750 * MS)));
-    assert!(far.holds_others_up() && far.in_vain_costs() == Gateway::ASSUMED_WAIT / 2, "one of two waits");
-}
-
-#[test]
-fn of_what_may_be_on_one_line_behind_a_gateway_two_are_owed_at_the_most() {
-    let (now, mut far) = side_by_side();
-    let at = |ms: u32| now + ms * MS;
-    assert_eq!(far.gate(3, false), None, "one may be before it");
-    owe(&mut far, 3, 2, at(100));
-    assert!(far.gate(4, false).is_some() && far.gate(4, true).is_some(), "both may be before it");
-    // That these two are not on one line shows when one of them is answered beside the other.
-    far.answered(at(120), 2, 2, true);
-    far.heard(at(200), 1, Some(1), Shape::ANY, false);
-    far.answered(at(220), 1, 1, true);
-    owe(&mut far, 1, 3, at(300));
-    far.answered(at(320), 2, 2, true);
-    assert_eq!(far.gate(4, false), None, "one of them may be before it");
-}
-
-#[test]
-fn each_drive_counts_as_having_a_line_of_its_own_once_four_were_silent_and_nobody_has_waited_for_any() {
-    let (now, mut far) = side_by_side();
-    for slave in 3..=5 {
-        owe(&mut far, slave, u16::from(slave), now);
-        far.answered(now + 20 * MS, 2, far.owes(), true);
-        assert_eq!(far.gate(6, false).is_none(), slave == 5, "{slave}");
-    }
-    assert!(!far.holds_others_up() && far.in_vain_costs().is_zero());
-    // The first that may have waited for another ends that.
-    owe(&mut far, 6, 6, now + 300 * MS);
-    far.answered(now + 320 * MS, 2, far.owes(), true);
-    far.heard(now + 3 * SECOND, 6, Some(6), Shape::ANY, false);
-    assert!(far.gate(7, false).is_some());
-}
-
-#[test]
-fn a_silent_drive_is_asked_once_more_when_others_have_been_answered_for_a_while() {
-    let (now, far) = side_by_side();
-    assert_eq!((far.gate(1, false), far.held_up(now, 1)), (Some(now + SECOND), Duration::ZERO));
 }

@@ -18,8 +18,6 @@ pub(super) struct Owed {
     pub(super) turn: Option<Turn>,
     /// It was asked over a connection that is gone, and so may be the question.
     pub(super) over_a_lost_port: bool,
-    /// Somebody was answered at once beside it: it does not hold all others up.
-    pub(super) passed: bool,
 }
 
 impl Owed {
