@@ -432,8 +432,9 @@ impl Error {
         }
     }
 
-    /// Whether nothing was written before it: it was refused here, was not sent, or is of a reading that was to come before the first write.
-    /// An exchange that fails behind a write says so by [`after_write`](Self::after_write).
+    /// Whether nothing was written before it that could move the motor or take its command: it was refused here, was not sent, or is of a
+    /// reading that was to come before that. The steps of a chart that lead up to a run command count as nothing. An exchange that fails
+    /// behind what does count says so by [`after_write`](Self::after_write).
     #[must_use]
     pub const fn has_written_nothing(&self) -> bool {
         match self.kind() {

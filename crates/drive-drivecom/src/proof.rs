@@ -15,7 +15,7 @@ use drive_core::{Direction, ErrorKind, Frequency, Ground, Lease, Motion, Output,
 /// change them.
 const LIMITS_HOLD: Duration = Duration::from_secs(10);
 
-/// How many setpoints are kept of which nobody has seen whether they arrived. Each is written behind a reading, which settles those before.
+/// How many setpoints are kept of which nobody has seen whether they arrived, until one is confirmed; the oldest goes first.
 const MAY_STAND: usize = 8;
 
 /// A low and a high limit.
