@@ -74,6 +74,7 @@ pub const ALL: &[Mutant] = &[
     mutant("stop-spares-commands", "a stop takes waiting commands with it"),
     mutant("order-goes-on-behind-stop", "an order ends with a stop that comes on its way"),
     mutant("stop-dropped-with-its-caller", "a stop is sent whether its caller waits or not"),
+    mutant("stop-dropped-with-its-line", "a stop is sent whether its caller waits or not"),
     mutant("stop-dropped-offline", "a stop is sent to a slave that is off-line"),
     mutant("stop-waits-for-the-gateway", "a stop is sent whatever the far end owes"),
     mutant("stop-rests-for-others", "a stop waits for its own share of the line"),

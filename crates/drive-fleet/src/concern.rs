@@ -137,6 +137,9 @@ table! {
     /// drive that tells no reference. Whether it follows is not judged.
     SetpointUnknown: "setpoint_unknown", "at which setpoint the motor runs is not known here", Note, false,
         "give it a setpoint: whether its output comes to that is watched from then on";
+    /// Its motor turns, control is on this bus, and no run command of this side stands in it.
+    RunByAnother: "run_by_another", "its motor turns by no command of this side", Note, false,
+        "see who runs it: another master on its line, or a setting of the drive";
     /// Its output was cut while the motor turned, and nothing tells when the shaft has come to rest.
     Coasting: "coasting", "output off, the shaft may coast", Note, false,
         "keep away from the shaft until it is seen to stand";

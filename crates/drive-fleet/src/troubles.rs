@@ -5,7 +5,7 @@ use tokio::time::Instant;
 
 use crate::{
     concern::{Concern, ConcernKind},
-    outcome::Tenths,
+    outcome::{Refused, Tenths},
     snapshot::{Freshness, IdentityCheck, Link, OffSetpoint, Snapshot, Trip, WatchdogCheck},
 };
 
@@ -126,6 +126,13 @@ impl Snapshot {
             ConcernKind::SetpointUnknown => {
                 let is_unknown = self.setpoint.is_none() && !self.tells_reference();
                 (None, (is_unknown && self.started_here() && shaft(Motion::Driven)).then_some(None)?)
+            }
+            ConcernKind::RunByAnother => {
+                let is_watched = self.start_refused == Some(Refused::ReadOnly);
+                let by = status.and_then(|status| status.value.control);
+                let is_elsewhere = by.is_some_and(|control| control != Control::Bus);
+                let is_ours = self.started_here() || self.stop.is_some() || is_watched || is_elsewhere;
+                (None, (!is_ours && shaft(Motion::Driven)).then_some(None)?)
             }
             ConcernKind::Coasting => (None, shaft(Motion::Coasting).then_some(None)?),
             ConcernKind::Held => (None, shaft(Motion::Held).then_some(None)?),

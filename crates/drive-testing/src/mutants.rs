@@ -54,11 +54,13 @@ pub enum Mutant {
     AnyReferenceIsOurs,
     /// Whatever speaks against a start, it may be given its setpoint.
     AnyStartMay,
+    /// What fails behind a write is told as if nothing had been written.
+    NothingWrittenSaidOfAll,
 }
 
 impl Mutant {
     /// All of them.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::StartConfirmedByAnything,
         Self::StopConfirmedByAnything,
         Self::RunTwice,
@@ -78,6 +80,7 @@ impl Mutant {
         Self::NoOutputIsStandstill,
         Self::AnyReferenceIsOurs,
         Self::AnyStartMay,
+        Self::NothingWrittenSaidOfAll,
     ];
 
     /// The family of a contract with this fault in it.

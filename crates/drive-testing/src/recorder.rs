@@ -4,6 +4,7 @@
 use std::{
     io,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
 };
 
 use async_trait::async_trait;
@@ -81,6 +82,10 @@ pub enum Habit {
     LosesAnswer(usize),
     /// Of the calls from now on the one of this number does not arrive.
     LosesRequest(usize),
+    /// From the call of this number on all arrive, and no answer comes.
+    LosesAnswersFrom(usize),
+    /// From the call of this number on none arrives.
+    LosesRequestsFrom(usize),
 }
 
 #[derive(Debug, Default)]
@@ -141,7 +146,11 @@ impl<P: Port> Recorder<P> {
         ledger.heard.push(Heard::of(self.terms, request));
         let number = ledger.calls;
         ledger.calls += 1;
-        let hit = matches!(ledger.habit, Habit::LosesAnswer(at) | Habit::LosesRequest(at) if at == number);
+        let hit = match ledger.habit {
+            Habit::LosesAnswer(at) | Habit::LosesRequest(at) => number == at,
+            Habit::LosesAnswersFrom(first) | Habit::LosesRequestsFrom(first) => number >= first,
+            Habit::Obeys | Habit::KeepsItsWords => false,
+        };
         (ledger.habit, hit)
     }
 }
@@ -174,8 +183,10 @@ impl<P: Port> Client for Recorder<P> {
             _ => None,
         };
         match habit {
-            Habit::LosesRequest(_) if hit => Err(unanswered(acknowledged.is_some())),
-            Habit::LosesAnswer(_) if hit => {
+            Habit::LosesRequest(_) | Habit::LosesRequestsFrom(_) if hit => {
+                Err(unanswered(acknowledged.is_some()))
+            }
+            Habit::LosesAnswer(_) | Habit::LosesAnswersFrom(_) if hit => {
                 self.port.call(request).await?.ok();
                 Err(unanswered(acknowledged.is_some()))
             }
@@ -202,6 +213,10 @@ impl<P: Port> Port for Recorder<P> {
     fn set_terms(&mut self, terms: Terms) {
         self.terms = terms;
         self.port.set_terms(terms);
+    }
+
+    fn wants_pause(&mut self, pause: Duration) {
+        self.port.wants_pause(pause);
     }
 
     fn made_for(&self) -> Option<SlaveAddress> {

@@ -117,7 +117,8 @@ impl Clients {
     /// A client has written a run command to a drive; gives what stands before it. What may be old is not his last word.
     pub(super) fn write_run(&self, by: &Connection, drive: &Place) -> Before {
         let last = lock(&self.course.0).without_run.get(drive).copied();
-        if last.is_some_and(|(at, connection)| at > by.opened && connection != by.opened) {
+        let is_older = |(at, connection)| at > by.opened && connection != by.opened;
+        if drive_fleet::mutant!("older-connection-starts", last.is_some_and(is_older), false) {
             return Before::NewerConnection;
         }
         match self.write(by.peer, drive, Word::Run) {

@@ -80,7 +80,10 @@ impl<C> Master<C> {
         self.closing = true;
         let is_open = matches!(self.port, PortState::Open);
         let is_stop = |entry: &Entry<Asked<C>>| entry.terms.class == Class::Stop && entry.work.is_write;
-        for entry in self.schedule.withdraw_all(|entry| !(is_open && is_stop(entry))) {
+        let stays = |entry: &Entry<Asked<C>>| {
+            crate::mutant!("stop-dropped-with-its-line", is_open && is_stop(entry), false)
+        };
+        for entry in self.schedule.withdraw_all(|entry| !stays(entry)) {
             self.drop_unsent(entry, PortError::Closed);
         }
     }

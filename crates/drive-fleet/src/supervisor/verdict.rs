@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use drive_core::{
-    Control, Error, ErrorKind, Measurements, PortError, Result, SETTLED_WITHIN, Setpoint, Status, StopMode,
-    Verdict,
+    Control, Error, ErrorKind, Lease, Measurements, PortError, Result, SETTLED_WITHIN, Setpoint, Status,
+    StopMode, Verdict,
 };
 use tokio::time::Instant;
 
@@ -200,7 +200,10 @@ impl Supervisor {
         let Some(active) = &self.active else { return };
         // Of one that was never written the run command of before is none.
         let is_its = match active.order {
-            Order::Start { direction, .. } => self.lease.is_some_and(|lease| lease.direction == direction),
+            Order::Start { direction, .. } => {
+                let its = |lease: Lease| lease.direction == direction;
+                self.lease.is_some_and(|lease| crate::mutant!("lease-of-before-confirms", its(lease), true))
+            }
             _ => true,
         };
         let verdict = status.verdict.filter(|verdict| is_its || *verdict != Verdict::InForce);

@@ -1,6 +1,7 @@
 //! A drive that disobeys, a line that loses an answer, and a witness that counts what was sent: what `Drive` says **must** be
 //! is judged here, and each complaint says what was claimed and what was counted.
 
+mod broken_off;
 mod lost;
 mod obeyed;
 mod proof;
@@ -107,6 +108,7 @@ impl Contract {
         all.extend(self.obeyed().await);
         all.extend(self.disobeyed().await);
         all.extend(self.with_lost_answers().await);
+        all.extend(self.knows_what_it_has_written().await);
         all.extend(self.proves_what_it_says().await);
         all
     }
@@ -116,6 +118,7 @@ impl Contract {
         !self.obeyed().await.is_empty()
             || !self.disobeyed().await.is_empty()
             || !self.with_lost_answers().await.is_empty()
+            || !self.knows_what_it_has_written().await.is_empty()
             || !self.proves_what_it_says().await.is_empty()
     }
 

@@ -5,8 +5,8 @@ use std::time::Duration;
 use async_trait::async_trait;
 use drive_core::{
     BroadcastWrite, Capabilities, Direction, Drive, Error, Faults, Follower, Frequency, Ground, Identity,
-    Intent, KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, Reaction, Recognised, Refusal,
-    Result, Row, SelfRestart, Setpoint, SlaveAddress, Status, StopMode, Stopped, Verdict, Watchdog,
+    Intent, KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, PortError, Reaction, Recognised,
+    Refusal, Result, Row, SelfRestart, Setpoint, SlaveAddress, Status, StopMode, Stopped, Verdict, Watchdog,
     WatchdogCapability, Withdrawn, Written, registers::Place,
 };
 
@@ -53,6 +53,18 @@ impl Faulty {
             status.verdict = None;
         }
         status
+    }
+
+    /// What this family makes of an error.
+    fn blamed(&self, error: Error) -> Error {
+        match error {
+            Error::Port { slave, exchange, problem: PortError::OutcomeUnknown(_) }
+                if self.is(Mutant::NothingWrittenSaidOfAll) && !exchange.is_write() =>
+            {
+                Error::Port { slave, exchange, problem: PortError::Timeout { after: Duration::ZERO } }
+            }
+            error => error,
+        }
     }
 
     /// The status that an error carries, or a fresh one: a family that confirms by anything.
@@ -147,7 +159,7 @@ impl Drive for Faulty {
         self.tap.starts(false);
         match started {
             Err(error) if self.is(Mutant::StartConfirmedByAnything) => self.anything(error).await,
-            started => started.map(|status| self.told(status)),
+            started => started.map(|status| self.told(status)).map_err(|error| self.blamed(error)),
         }
     }
 
@@ -181,7 +193,7 @@ impl Drive for Faulty {
     async fn set_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
         match self.drive.set_setpoint(setpoint).await {
             Err(_) if self.is(Mutant::SetpointNotCompared) => Ok(()),
-            given => given,
+            given => given.map_err(|error| self.blamed(error)),
         }
     }
 

@@ -6,6 +6,7 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
+    time::Duration,
 };
 
 use async_trait::async_trait;
@@ -117,6 +118,10 @@ impl<P: Port> Port for Faulty<P> {
         }
         self.terms = terms;
         self.port.set_terms(terms);
+    }
+
+    fn wants_pause(&mut self, pause: Duration) {
+        self.port.wants_pause(pause);
     }
 
     fn made_for(&self) -> Option<SlaveAddress> {

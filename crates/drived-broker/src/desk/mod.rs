@@ -181,7 +181,7 @@ impl<A: Answers + Sync> Desk<A> {
             (false, None) => message.lifetime,
         };
         let is_undated = issued.is_none() && message.sent_unix_ms.is_none();
-        if message.needs_issued
+        if drive_fleet::mutant!("undated-command-moves", message.needs_issued, false)
             && is_undated
             && matches!(request.action, Action::Start { .. } | Action::Setpoint { .. })
         {

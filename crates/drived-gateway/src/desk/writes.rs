@@ -54,7 +54,7 @@ impl Who<'_> {
     /// Whether somebody is there who may hear what becomes of it. Only a stop is carried out for whom it is not so: what was held back on
     /// the way comes together with the end of a connection that was given up long before.
     fn hears(self) -> Result<(), Refusal> {
-        match self.by.is_open() {
+        match drive_fleet::mutant!("starts-for-nobody", self.by.is_open(), true) {
             true => Ok(()),
             false => {
                 Err(Refusal::rule("its client has closed the connection: nobody would hear that it was done"))

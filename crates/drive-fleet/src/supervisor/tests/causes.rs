@@ -127,6 +127,29 @@ fn what_somebody_else_starts_and_stops_later_is_not_told_as_the_command_of_befor
     }
 }
 
+/// Who has stopped a motor and sees it run again is told that nobody here has started it.
+#[test]
+fn a_motor_that_another_master_starts_behind_a_confirmed_stop_is_told_as_not_ours_for_as_long_as_it_turns() {
+    let told = |rig: &Rig| {
+        rig.snapshot().concerns(rig.now).iter().any(|concern| concern.kind == ConcernKind::RunByAnother)
+    };
+    let mut rig = Rig::running_at(25);
+    assert!(!told(&rig));
+    let stop = rig.stop(StopMode::Ramp);
+    rig.pass(2_000 * MS);
+    assert!(rig.outcome(stop).is_some_and(Outcome::is_confirmed) && !told(&rig));
+    rig.drive.run();
+    rig.pass(1_000 * MS);
+    assert!(told(&rig));
+    rig.drive.status.control = Some(Control::Terminals);
+    rig.pass(1_000 * MS);
+    assert!(!told(&rig), "who runs it is told");
+    rig.drive.status.control = Some(Control::Bus);
+    rig.drive.stand();
+    rig.pass(1_000 * MS);
+    assert!(!told(&rig));
+}
+
 #[test]
 fn a_stop_says_who_stopped_and_a_removal_is_no_exit() {
     for (policy, name) in [(Policy::Exit, "exit"), (Policy::Removal, "removed")] {

@@ -1,6 +1,7 @@
 //! Orders and their outcomes.
 
 use super::*;
+use crate::LimitProblem;
 
 #[test]
 fn a_start_gives_the_setpoint_first_and_is_confirmed_at_the_reference() {
@@ -297,6 +298,33 @@ fn limits_and_bands_refuse_a_setpoint_before_anything_is_sent() {
         );
     }
     assert_eq!(rig.drive.writes(), []);
+}
+
+/// What stands in the drive nobody knows: what it turns at counts.
+#[test]
+fn a_setpoint_that_was_withdrawn_on_its_way_frees_none_of_the_largest_change_per_second() {
+    let mut rig = Rig::running_at(25);
+    rig.pass(2_000 * MS);
+    rig.machine.settings.limits.change_per_second = Some(Frequency::from_hertz(2));
+    let id = rig.order(setpoint(26));
+    loop {
+        match rig.machine.next(rig.now) {
+            Step::Do { job: Job::SetSetpoint(..), .. } => break,
+            Step::Do { job, .. } => {
+                let reply = rig.drive.answer(job);
+                rig.machine.handle_reply(rig.now, reply);
+            }
+            step => panic!("{step:?}"),
+        }
+    }
+    assert!(rig.machine.handle_withdrawal(rig.now, id), "its job is dropped");
+    let id = rig.order(setpoint(40));
+    rig.pass(500 * MS);
+    let outcome = rig.outcome(id);
+    assert!(
+        matches!(outcome, Some(Outcome::Refused(Refused::Limit(LimitProblem::TooFast { .. })))),
+        "{outcome:?}"
+    );
 }
 
 #[test]

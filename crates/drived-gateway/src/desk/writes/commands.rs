@@ -156,7 +156,8 @@ impl Desk {
                 ));
             }
         };
-        sleep_until((arrived + END_FOLLOWS).min(deadline)).await;
+        let end = drive_fleet::mutant!("end-of-a-connection-unawaited", arrived + END_FOLLOWS, arrived);
+        sleep_until(end.min(deadline)).await;
         who.hears()?;
         self.plant.watched().start(watched(&self.config), who.by.peer, drive).await;
         self.order_asked_after(who, drive, action, (arrived, asked_after), deadline).await

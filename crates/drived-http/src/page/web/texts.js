@@ -162,6 +162,7 @@ const TABLE = {
   concern_control_taken: ['somebody else has taken control', 'quelqu’un d’autre a pris la commande'],
   concern_stop_pending: ['a stop is on its way, not confirmed yet', 'un arrêt est en cours, pas encore confirmé'],
   concern_setpoint_unknown: ['at which setpoint the motor runs is not known here', 'à quelle consigne le moteur tourne n’est pas connu ici'],
+  concern_run_by_another: ['its motor turns by no command of this side', 'son moteur tourne sans aucune commande d’ici'],
   concern_coasting: ['output off, the shaft may coast', 'sortie coupée, l’arbre peut encore tourner'],
   concern_held: ['direct current holds the shaft', 'un courant continu maintient l’arbre'],
   concern_never_seen: ['not seen yet', 'pas encore vu'],
