@@ -90,6 +90,7 @@ export const SENTENCES_FR = {
   'read its faults: they name the alarm': 'lire ses défauts : ils nomment l’alarme',
   'give control back there': 'y rendre la commande',
   'give it a setpoint: whether its output comes to that is watched from then on': 'lui donner une consigne : dès lors, il est surveillé que sa sortie y parvienne',
+  'see who runs it: another master on its line, or a setting of the drive': 'voir qui le fait tourner : un autre maître sur sa ligne, ou un réglage du variateur',
   'wait until it is confirmed': 'attendre qu’il soit confirmé',
   'the current heats the motor: it ends with its time, or with a ramp stop': 'le courant échauffe le moteur : il cesse à son terme, ou par un arrêt sur rampe',
   'keep away from the shaft until it is seen to stand': 'se tenir à l’écart de l’arbre tant qu’on ne l’a pas vu à l’arrêt',
