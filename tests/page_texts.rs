@@ -4,7 +4,7 @@ use std::{path::Path, time::Duration};
 
 use drive_bus::evidence::{Alike, Certainty, Defect, Finding};
 use drive_core::{Control, FaultEntry, Refusal};
-use drive_fleet::{LimitProblem, Refused};
+use drive_fleet::{ConcernKind, LimitProblem, Refused, alarms::AlarmKind};
 
 #[test]
 fn every_fault_and_alarm_of_every_family_has_its_french_text_on_the_page() {
@@ -24,6 +24,21 @@ fn every_fault_and_alarm_of_every_family_has_its_french_text_on_the_page() {
         for text in [entry.meaning, entry.remedy] {
             assert!(french.contains(&format!("  '{text}': '")), "{}: {text}", entry.mnemonic);
         }
+    }
+}
+
+#[test]
+fn what_troubles_and_what_to_do_about_it_stands_in_french_on_the_page() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/drived-http/src/page/web/");
+    let read = |file: &str| std::fs::read_to_string(format!("{root}{file}")).expect("it is read");
+    let (texts, sentences) =
+        (read("texts.js").replace("\\'", "'"), read("sentences_fr.js").replace("\\'", "'"));
+    for kind in ConcernKind::ALL {
+        assert!(texts.contains(&format!("  concern_{}: ['{}', '", kind.word(), kind.words())), "{kind:?}");
+    }
+    let told = ConcernKind::ALL.iter().map(|kind| kind.remedy());
+    for remedy in told.chain(AlarmKind::all().map(AlarmKind::remedy)) {
+        assert!(sentences.contains(&format!("  '{remedy}': '")), "{remedy}");
     }
 }
 
