@@ -42,7 +42,7 @@ fn control(family: Family) -> (ControlWord, &'static [u16]) {
     /// `ETA` of the chart's states, `ETI` with the bus in control, 0 and small numbers.
     const CHART: &[u16] = &[0x0240, 0x0221, 0x0223, 0x0227, 0x0227, 0x4000, 0, 0, 0, 1, 2, 0x0208];
     const fn control(register: u16, words: &'static [u16]) -> ControlWord {
-        ControlWord { register, words, others: |_| 0, unseen: &[] }
+        ControlWord { register, words, others: |_| 0, unseen: &[], once: &[] }
     }
     match five(family) {
         // Guide d'exploitation §8.4: the priorities, as far as CMOD and FMOD do not give the bus command, with run, reverse,

@@ -277,6 +277,7 @@ impl<P: Port> Drivecom for Atv312<P> {
             return Ok(RunShown::NotYet);
         }
         // The setpoint that the run command found is the one that it is to follow from now on.
+        self.recounted = false;
         self.proof.is_to_follow(in_force);
         status.verdict = Some(Verdict::InForce);
         Ok(shown)

@@ -90,6 +90,10 @@ pub struct Atv312<P> {
     set_up_before: Vec<(Register<WriteStopped>, u16)>,
     /// Whether the automatic restart is accepted.
     accepts_restart: bool,
+    /// In which counts the setpoint that stands was given, or was seen last.
+    counted: Option<reading::Resolution>,
+    /// The count of the reference was changed since the setpoint was given.
+    recounted: bool,
     /// Whether a parameter was changed since the last save.
     unsaved: bool,
     saves: u32,
@@ -113,6 +117,8 @@ impl<P: Port> Atv312<P> {
             control: None,
             set_up_before: Vec::new(),
             accepts_restart: false,
+            counted: None,
+            recounted: false,
             unsaved: false,
             saves: 0,
         }

@@ -157,6 +157,10 @@ impl<P: Port> Atv312<P> {
             by: "a reference that another master has written (LFr or LFRD)",
             remedy: "see which one it is, and give the setpoint again",
         };
+        const COUNTED_OTHERWISE: Refusal = Refusal::Overridden {
+            by: "another count of the reference (CMI bit 9 was changed since the setpoint was given)",
+            remedy: "see who has changed it, and give the setpoint again",
+        };
         let settings = &self.known.settings;
         if let Some(reason) = settings.refuses_reference().filter(|_| settings.is_complete()) {
             return Told::No(reason);
@@ -166,12 +170,17 @@ impl<P: Port> Atv312<P> {
         match self.proof.followed(words.reference(), count, [LFR.address(), LFRD.address()]) {
             Followed::Ours => Told::Yes,
             Followed::NotTold => Told::NotTold,
+            Followed::AnotherMasters if self.recounted => Told::No(COUNTED_OTHERWISE),
             Followed::AnotherMasters => Told::No(WRITTEN_BY_ANOTHER),
             Followed::Elsewhere => {
                 let named = settings.overrides(&self.facts, self.proof.held().unwrap_or(0));
                 let is_beyond =
                     words.state_words().eta.contains(crate::words::StatusWord::REFERENCE_EXCEEDED);
-                let unnamed = if is_beyond { BEYOND_LIMIT } else { OTHER_REFERENCE };
+                let unnamed = match (self.recounted, is_beyond) {
+                    (true, _) => COUNTED_OTHERWISE,
+                    (false, true) => BEYOND_LIMIT,
+                    (false, false) => OTHER_REFERENCE,
+                };
                 Told::No(named.unwrap_or(unnamed))
             }
         }
@@ -232,8 +241,13 @@ impl<P: Port> Atv312<P> {
         let unwatched = (cmi & ExtendedControl::NO_TIMEOUT).bits();
         self.proof.watch.finds(CMI.address(), unwatched, Ground::Watchdog);
         let resolution = Resolution::of(cmi);
-        if self.known.resolution.is_some_and(|known| known != resolution) {
+        if let Some(before) = self.counted.replace(resolution).filter(|before| *before != resolution) {
             self.proof.watch.changes(Ground::Units);
+            // Both registers of the reference: at high resolution the second is a frequency, too.
+            for register in [LFR.address(), LFRD.address()] {
+                self.proof.recount(register, |word| resolution.recounted(word, before));
+            }
+            self.recounted = true;
         }
         self.known.resolution = Some(resolution);
     }

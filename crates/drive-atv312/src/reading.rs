@@ -58,6 +58,17 @@ impl Resolution {
         }
     }
 
+    /// The word that stands nearest for what `word` was at the resolution of `before`, with its sign.
+    pub(crate) fn recounted(self, word: u16, before: Self) -> u16 {
+        let centihertz = u64::from(before.frequency(word).centihertz());
+        let counts = match self {
+            Self::Normal => (centihertz + 5) / 10,
+            Self::High => (centihertz * 32_767 + 30_000) / 60_000,
+        };
+        let word_of = u16::try_from(counts).unwrap_or(u16::MAX).min(i16::MAX.unsigned_abs());
+        if word.cast_signed() < 0 { word_of.wrapping_neg() } else { word_of }
+    }
+
     /// The step of a frequency setpoint, for errors.
     pub(crate) const fn step(self) -> &'static str {
         match self {

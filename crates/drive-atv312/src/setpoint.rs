@@ -44,6 +44,7 @@ impl<P: Port> Atv312<P> {
         let word = if self.is_negative(&words, &controls).await? { negative(word) } else { word };
         // Both are images of the one reference of the bus, so a later setpoint of either kind takes the place of one
         // that still waits.
+        self.recounted = false;
         self.proof.is_giving(register.address(), word);
         let written = self.registers.at(Class::Command).replacing(LFR.address()).write(register, word).await;
         let is_lfr = register.address() == LFR.address();

@@ -64,6 +64,36 @@ async fn bit_9_of_cmi_a_changed_watchdog_and_lowered_limits_are_seen_in_their_ti
     assert!(matches!(error, Error::Setpoint { .. }), "{error}");
 }
 
+/// p. 20: the same word is another frequency then, and nobody has asked for that one.
+#[tokio::test(start_paused = true)]
+async fn a_motor_whose_reference_another_master_counts_otherwise_is_not_in_force_until_its_setpoint_is_given_again()
+ {
+    for (before, after) in [(0, 1 << 9), (1 << 9, 0)] {
+        let model = models::atv312::Atv312::under_bus_control();
+        let (mut drive, machine, line) = bench::on_a_line(&drive_atv312::CAPABILITIES, model, Atv312::new);
+        bench::write(&line, 8504, before).await;
+        drive.set_setpoint(Frequency::from_hertz(10).into()).await.unwrap();
+        drive.start(Direction::Forward).await.unwrap();
+        machine.wait_until(|seen| seen.output_frequency.abs_diff(1_000) < 5).await;
+        assert_eq!(drive.status().await.unwrap().verdict, Some(Verdict::InForce));
+        bench::write(&line, 8504, after).await;
+        let mut verdict = None;
+        for _ in 0..100 {
+            tokio::time::sleep(Duration::from_millis(100)).await;
+            verdict = drive.status().await.unwrap().verdict;
+            if matches!(verdict, Some(Verdict::NotInForce { .. })) {
+                break;
+            }
+        }
+        let Some(Verdict::NotInForce { because: Refusal::Overridden { by, .. }, .. }) = verdict else {
+            panic!("CMI {after:04X}h: {verdict:?}, {:?}", machine.observe());
+        };
+        assert!(by.contains("CMI bit 9"), "{by}");
+        drive.set_setpoint(Frequency::from_hertz(10).into()).await.unwrap();
+        assert_eq!(drive.status().await.unwrap().verdict, Some(Verdict::InForce));
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn nothing_is_saved_while_the_motor_runs() {
     // p. 22: while ETI bit 0 is set nothing can be written.

@@ -128,8 +128,8 @@ pub trait Drive: Send {
         None
     }
 
-    /// What a contract rests on that a status has found otherwise than it was when it was last read or set; told once.
-    /// Nothing is sent.
+    /// What a contract rests on that a status has found otherwise than it was when it was last read or set; told once. Nobody else
+    /// looks again: a watchdog that was armed is taken for armed until this says otherwise. Nothing is sent.
     fn take_changed(&mut self) -> Option<Ground> {
         None
     }

@@ -177,6 +177,14 @@ impl<L: Copy + PartialEq> Proof<L> {
         self.may_stand.clear();
     }
 
+    /// A count of `register` is another one from now on: what was given there would be this word now, which the drive does not hold.
+    pub fn recount(&mut self, register: u16, recounted: impl Fn(u16) -> u16) {
+        let setpoints = self.given.iter_mut().chain(&mut self.may_stand);
+        for (_, word) in setpoints.filter(|(given, _)| *given == register) {
+            *word = recounted(*word);
+        }
+    }
+
     /// The setpoint that is to be in force, its register and its word.
     #[must_use]
     pub const fn given(&self) -> Option<(u16, u16)> {

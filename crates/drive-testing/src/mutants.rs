@@ -56,11 +56,13 @@ pub enum Mutant {
     AnyStartMay,
     /// What fails behind a write is told as if nothing had been written.
     NothingWrittenSaidOfAll,
+    /// A start of which no answer came has no lease.
+    LeaseWantsAnAnswer,
 }
 
 impl Mutant {
     /// All of them.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::StartConfirmedByAnything,
         Self::StopConfirmedByAnything,
         Self::RunTwice,
@@ -81,6 +83,7 @@ impl Mutant {
         Self::AnyReferenceIsOurs,
         Self::AnyStartMay,
         Self::NothingWrittenSaidOfAll,
+        Self::LeaseWantsAnAnswer,
     ];
 
     /// The family of a contract with this fault in it.

@@ -44,8 +44,13 @@ fn broken(mutant: Mutant, family: Family) -> Box<Open> {
         move |port, slave| family.open_with(port, slave, &family.simulated_options()),
         move || family.machine(SetUp::ForTheBus).expect("it has a twin"),
     );
-    let control =
-        control(family).map(|register| ControlWord { register, words: &[], others: |_| 0, unseen: &[] });
+    let control = control(family).map(|register| ControlWord {
+        register,
+        words: &[],
+        others: |_| 0,
+        unseen: &[],
+        once: &[],
+    });
     mutant.of(Contract { control, ..whole }).open
 }
 

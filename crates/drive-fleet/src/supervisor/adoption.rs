@@ -10,6 +10,7 @@ use crate::{
     event::EventKind,
     settings::{DriveSettings, RunRecord},
     snapshot::IdentityCheck,
+    stop_order::StopOrder,
 };
 
 /// How far it is known whether a run of before is ours.
@@ -47,16 +48,31 @@ impl Supervisor {
                 let stop = record.stop_order();
                 self.adoption = record.lease.map_or(Adoption::Decided, Adoption::Due);
                 self.pace.hurry(now);
-                // Whoever turns it, it is not to go on: who has given its stop has not seen it confirmed.
-                if let Some(stop) = crate::mutant!("stop-of-before-forgotten", stop, None) {
-                    self.stop_by_policy(now, Asker::Policy(Policy::StopOfBefore), stop);
-                }
+                self.stop_goes_on(now, stop);
                 return;
             }
-            _ if record.lease.is_none() => "a stop of before was given to another drive than answers here",
-            _ => "it was given to another drive than answers here",
+            // The motor is the one at this place, whatever drive has come to it.
+            _ => {
+                let stop = record.stop_order();
+                let why = match stop {
+                    Some(_) => {
+                        "it was given to another drive than answers here, to which the stop of before is given"
+                    }
+                    None => "it was given to another drive than answers here",
+                };
+                self.not_adopted(why.to_owned());
+                self.stop_goes_on(now, stop);
+                return;
+            }
         };
         self.not_adopted(why.to_owned());
+    }
+
+    /// Whoever turns it, it is not to go on: who has given its stop has not seen it confirmed.
+    fn stop_goes_on(&mut self, now: Instant, stop: Option<StopOrder>) {
+        if let Some(stop) = crate::mutant!("stop-of-before-forgotten", stop, None) {
+            self.stop_by_policy(now, Asker::Policy(Policy::StopOfBefore), stop);
+        }
     }
 
     /// Whether a stop of before waits for the drive to say which it is.

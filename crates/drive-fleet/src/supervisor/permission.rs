@@ -155,12 +155,12 @@ impl Supervisor {
             }
             Order::Start { direction, setpoint, .. } => {
                 self.allow_motion(now, status, active)?;
-                // What the drive holds may be another master's by now, and the limits others than when it was given: it is given anew.
-                let given = || self.given.map(|given| given.setpoint).ok_or(LimitProblem::UnknownSetpoint);
-                let setpoint = match setpoint {
-                    None if !self.settings.limits.is_empty() => Some(given().map_err(Refused::Limit)?),
-                    asked => asked,
-                };
+                // What the drive holds may be another master's by now, or counted otherwise, and the limits others than when it was given:
+                // what is shown as its setpoint is given anew.
+                let setpoint = setpoint.or(self.given.map(|given| given.setpoint));
+                if setpoint.is_none() && !self.settings.limits.is_empty() {
+                    return Err(Refused::Limit(LimitProblem::UnknownSetpoint).into());
+                }
                 match setpoint {
                     Some(setpoint) if active.is_none_or(|active| active.setpoint_given.is_none()) => {
                         self.allow_setpoint(now, setpoint)?;

@@ -23,6 +23,8 @@ use crate::{
 const SETPOINT: Frequency = Frequency::from_hertz(20);
 /// Another one.
 const OTHER: Frequency = Frequency::from_hertz(25);
+/// More calls than any order to a healthy drive takes.
+const CALLS: usize = 40;
 /// Longer than every ramp from there, and than a family waits for a confirmation.
 const SETTLED: Duration = Duration::from_secs(12);
 

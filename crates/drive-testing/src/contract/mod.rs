@@ -78,6 +78,10 @@ pub struct ControlWord {
     /// Those of the values that a drive which answers any word is never sent, because one of its settings always decides
     /// something else.
     pub unseen: &'static [u16],
+    /// Those of the values that act when they are written, and not for as long as they stand, such as the pulse of a start: each is sent
+    /// as an edge and once for an order. One that is written again because its answer was lost starts a motor that somebody has
+    /// stopped meanwhile.
+    pub once: &'static [u16],
 }
 
 /// A status word, and what tells a trip.

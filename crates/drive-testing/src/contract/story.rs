@@ -10,6 +10,7 @@ use super::{Contract, claims::reset, is_given};
 use crate::rig::Rig;
 
 const SETPOINT: Frequency = Frequency::from_hertz(30);
+const OTHER: Frequency = Frequency::from_hertz(25);
 
 impl Contract {
     /// It starts, reaches its reference, reverses, stops by each mode, trips, is reset and stays still, is stopped by its
@@ -66,9 +67,17 @@ async fn it_reverses(rig: &mut Rig) {
     let status = rig.until_at(SETPOINT).await;
     assert_eq!(status.direction, Some(Direction::Reverse));
     assert_eq!(rig.machine.observe().output_frequency, -3_000);
+    // A setpoint says how fast, and never which way.
+    let given = rig.drive.set_setpoint(OTHER.into()).await;
+    assert!(is_given(&given), "25 Hz is within its limits: {given:?}");
+    rig.until_machine("it turns the same way as fast as it was given", |machine| {
+        machine.output_frequency == -2_500
+    })
+    .await;
 }
 
 async fn it_stops_by_each_mode_that_it_claims_and_by_another_for_the_rest(rig: &mut Rig) {
+    give(rig).await;
     for mode in StopMode::ALL {
         rig.drive.start(Direction::Forward).await.unwrap_or_else(|error| panic!("before {mode}: {error}"));
         rig.until_at(SETPOINT).await;

@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Capabilities, Direction, Drive, Error, Faults, Follower, Frequency, Ground, Identity,
-    Intent, KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, PortError, Reaction, Recognised,
-    Refusal, Result, Row, SelfRestart, Setpoint, SlaveAddress, Status, StopMode, Stopped, Verdict, Watchdog,
-    WatchdogCapability, Withdrawn, Written, registers::Place,
+    BroadcastWrite, Capabilities, Direction, Drive, Error, ErrorKind, Faults, Follower, Frequency, Ground,
+    Identity, Intent, KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, PortError, Reaction,
+    Recognised, Refusal, Result, Row, SelfRestart, Setpoint, SlaveAddress, Status, StopMode, Stopped,
+    Verdict, Watchdog, WatchdogCapability, Withdrawn, Written, registers::Place,
 };
 
 use super::{Mutant, port::Tap};
@@ -157,6 +157,9 @@ impl Drive for Faulty {
         self.tap.starts(true);
         let started = self.drive.start(direction).await;
         self.tap.starts(false);
+        let is_unknown =
+            |error: &Error| matches!(error.kind(), ErrorKind::OutcomeUnknown | ErrorKind::NoAnswer);
+        self.ended |= self.is(Mutant::LeaseWantsAnAnswer) && started.as_ref().is_err_and(is_unknown);
         match started {
             Err(error) if self.is(Mutant::StartConfirmedByAnything) => self.anything(error).await,
             started => started.map(|status| self.told(status)).map_err(|error| self.blamed(error)),

@@ -40,6 +40,7 @@ fn contract() -> Contract {
             words: &[0x0000, 0x0001, 0x0003, 0x0004],
             others: |_| 0,
             unseen: &[],
+            once: &[],
         }),
         status: Some(StatusWord { register: 0x0102, others: &[], is_tripped: |word| word & 0x0008 != 0 }),
         exceptions: &[(1, NoSuchFunction), (2, NoSuchRegister), (3, ValueRefused)],

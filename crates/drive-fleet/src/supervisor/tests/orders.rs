@@ -199,6 +199,8 @@ fn an_order_that_fails_before_anything_is_written_is_refused_and_takes_nothing_b
 #[test]
 fn a_lost_start_the_other_way_is_not_confirmed_by_the_run_command_that_stands() {
     let mut rig = Rig::running_at(25);
+    // No setpoint goes before its run word.
+    rig.machine.handle_changed(rig.now, drive_core::Ground::Units);
     rig.drive.loses_answer = true;
     rig.drive.obeys = false;
     let id = rig.order(Order::Start { direction: Direction::Reverse, setpoint: None, until: Until::InForce });

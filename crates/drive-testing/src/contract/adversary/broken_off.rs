@@ -1,27 +1,33 @@
-//! Orders whose line is lost in their midst: an error that says that nothing was written is one of an order that has written nothing.
+//! Orders whose line is lost in their midst: an error that says that nothing was written is one of an order that has written nothing,
+//! what a start has moved turns its way, and has a lease.
 
 use drive_core::Direction;
 
-use super::{Complaint, OTHER, SETPOINT, SETTLED, Stage};
+use super::{CALLS, Complaint, OTHER, SETPOINT, SETTLED, Stage};
 use crate::{
     contract::Contract,
     recorder::{Habit, Heard},
 };
 
-/// More calls than any order to a healthy drive takes.
-const CALLS: usize = 40;
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Order {
     Start,
+    /// Of a motor that turned the other way before it was stopped.
+    StartBehindReverse,
     StartTheOtherWay,
     Setpoint,
     Reset,
     Release,
 }
 
-const ORDERS: [Order; 5] =
-    [Order::Start, Order::StartTheOtherWay, Order::Setpoint, Order::Reset, Order::Release];
+const ORDERS: [Order; 6] = [
+    Order::Start,
+    Order::StartBehindReverse,
+    Order::StartTheOtherWay,
+    Order::Setpoint,
+    Order::Reset,
+    Order::Release,
+];
 
 impl Contract {
     pub(super) async fn knows_what_it_has_written(&self) -> Vec<Complaint> {
@@ -46,6 +52,12 @@ impl Contract {
         match (order, self.trip) {
             (Order::StartTheOtherWay, _) if stage.run().await.is_none() => return 0,
             (Order::StartTheOtherWay, _) => {}
+            (Order::StartBehindReverse, _) => {
+                let _ = stage.rig.drive.set_setpoint(SETPOINT.into()).await;
+                let _ = stage.rig.drive.start(Direction::Reverse).await;
+                stage.live(SETTLED).await;
+                stage.stop_at_last().await;
+            }
             (Order::Reset, Some(trip)) => {
                 stage.rig.machine.trip(trip);
                 let _ = stage.rig.drive.status().await;
@@ -57,7 +69,7 @@ impl Contract {
         stage.witness.from_now_on(habit);
         let drive = &mut stage.rig.drive;
         let ended = match order {
-            Order::Start => drive.start(Direction::Forward).await.map(drop),
+            Order::Start | Order::StartBehindReverse => drive.start(Direction::Forward).await.map(drop),
             Order::StartTheOtherWay => drive.start(Direction::Reverse).await.map(drop),
             Order::Setpoint => drive.set_setpoint(OTHER.into()).await,
             Order::Reset => drive.reset_faults().await.map(drop),
@@ -71,13 +83,23 @@ impl Contract {
         stage.live(SETTLED).await;
         // The words that lead up to a run command are no order, as long as nothing turns by them.
         let control = self.control.map(|control| control.register);
-        let leads_up = order == Order::Start && stage.rests();
+        let is_start = matches!(order, Order::Start | Order::StartBehindReverse);
+        let leads_up = is_start && stage.rests();
         let is_order = |heard: &&Heard| heard.writes() && !(leads_up && heard.register == control);
         if let Err(error) = &ended
             && error.has_written_nothing()
             && let Some(written) = arrived.iter().find(is_order)
         {
             stage.blame(format!("{order:?}, {habit:?}: nothing was written ({error}), and {written:?} was"));
+        }
+        let seen = stage.seen();
+        if is_start && seen.output_frequency < 0 {
+            stage
+                .blame(format!("{order:?}, {habit:?}: a start forward turns the motor in reverse: {seen:?}"));
+        }
+        if is_start && seen.running && stage.rig.drive.lease().is_none() {
+            stage
+                .blame(format!("{order:?}, {habit:?}: the motor runs by it, and no lease stands: {ended:?}"));
         }
         stage.stop_at_last().await;
         heard.len()

@@ -2,11 +2,8 @@
 
 use drive_core::{Direction, StopMode};
 
-use super::{Complaint, SETPOINT, SETTLED, Stage, denies};
+use super::{CALLS, Complaint, SETPOINT, SETTLED, Stage, denies};
 use crate::{contract::Contract, recorder::Habit};
-
-/// More calls than any command of a healthy drive takes.
-const CALLS: usize = 40;
 
 #[derive(Debug, Clone, Copy)]
 enum Asked {

@@ -4,7 +4,7 @@ use std::{iter, time::Duration};
 
 use drive_core::{Class, Direction, Error, StopMode, Withdrawn};
 
-use super::{Complaint, OTHER, SETPOINT, SETTLED, Stage};
+use super::{CALLS, Complaint, OTHER, SETPOINT, SETTLED, Stage};
 use crate::{
     contract::{Contract, is_given},
     recorder::{Habit, Heard},
@@ -27,6 +27,8 @@ impl Contract {
         complaints.extend(self.stop_before_all_else(true).await);
         complaints.extend(self.stop_before_all_else(false).await);
         complaints.extend(self.run_command_once().await);
+        complaints.extend(self.what_acts_once_is_written_once().await);
+        complaints.extend(self.no_command_is_a_parameter().await);
         complaints.extend(self.reset_is_an_edge().await);
         complaints.extend(self.who_asks_is_told_what_a_start_would_be().await);
         complaints.extend(self.forgets().await);
@@ -93,7 +95,50 @@ impl Contract {
         stage.complaints
     }
 
-    /// A reset is written and cleared.
+    /// A word that acts when it is written is an edge, and is written once whichever answer is lost.
+    async fn what_acts_once_is_written_once(&self) -> Vec<Complaint> {
+        let Some(control) = self.control.filter(|control| !control.once.is_empty()) else {
+            return Vec::new();
+        };
+        let mut complaints = Vec::new();
+        for number in 0..CALLS {
+            let mut stage = self.stage("a word that acts once is an edge, and is written once").await;
+            let _ = stage.rig.drive.set_setpoint(SETPOINT.into()).await;
+            stage.witness.from_now_on(Habit::LosesAnswer(number));
+            let _ = stage.rig.drive.start(Direction::Forward).await;
+            let heard = stage.witness.heard();
+            let acts = |heard: &&Heard| {
+                heard.written_to(control.register).is_some_and(|word| control.once.contains(&word))
+            };
+            let acted: Vec<&Heard> = heard.iter().filter(acts).collect();
+            if acted.len() > 1 || acted.iter().any(|heard| !heard.is_edge()) {
+                stage.blame(format!("the answer of call {number} is lost: it sent {acted:?}"));
+            }
+            complaints.append(&mut stage.complaints);
+            if heard.len() <= number {
+                break;
+            }
+        }
+        complaints
+    }
+
+    /// A control word goes out by an order, and never as the value of a parameter.
+    async fn no_command_is_a_parameter(&self) -> Vec<Complaint> {
+        let mut stage = self.stage("no command goes out as a parameter").await;
+        let Some(control) = self.control else { return Vec::new() };
+        for row in self.capabilities.rows.iter().filter(|row| row.address == control.register) {
+            for word in control.words {
+                stage.witness.from_now_on(Habit::Obeys);
+                let _ = stage.rig.drive.write_parameter(row, *word).await;
+                if stage.witness.heard().iter().any(|heard| heard.written_to(control.register).is_some()) {
+                    stage.blame(format!("{word:04X}h goes out by {}", row.code));
+                }
+            }
+        }
+        stage.complaints
+    }
+
+    /// A reset is written and cleared; one that has a register of its own is an edge there.
     async fn reset_is_an_edge(&self) -> Vec<Complaint> {
         let mut stage = self.stage("a reset is one edge that is cleared").await;
         let (Some(control), Some(trip)) = (self.control, self.trip) else { return Vec::new() };
@@ -107,6 +152,10 @@ impl Contract {
         stage.witness.from_now_on(Habit::Obeys);
         let _ = stage.rig.drive.reset_faults().await;
         let words = stage.witness.written_to(control.register);
+        let heard = stage.witness.heard();
+        if words.is_empty() && heard.iter().filter(|heard| heard.writes() && heard.is_edge()).count() == 1 {
+            return stage.complaints;
+        }
         let edge = words.split_last().is_some_and(|(last, before)| before.iter().any(|word| word != last));
         if !edge {
             stage.blame(format!("it wrote {words:04X?} and nothing after it"));

@@ -192,6 +192,8 @@ export const SENTENCES_FR = {
   'the reference W401 is negative: give a setpoint first': 'la référence W401 est négative : donner d’abord une consigne',
 
   'a reference on the bus (LFr or LFRD) is negative: stop the motor, and give a setpoint in its unit first': 'une référence du bus (LFr ou LFRD) est négative : arrêter le moteur et donner d’abord une consigne dans son unité',
+  'another count of the reference (CMI bit 9 was changed since the setpoint was given)': 'un autre pas de la référence (CMI bit 9 a été changé depuis que la consigne a été donnée)',
+  'see who has changed it, and give the setpoint again': 'voir qui l’a changé, et donner la consigne à nouveau',
   'a reference that another master has written (LFr or LFRD)': 'une référence écrite par un autre maître (LFr ou LFRD)',
   'see which one it is, and give the setpoint again': 'voir lequel, et donner la consigne à nouveau',
   'stop the motor by the bus first, which says whom it takes command from, or reset the fault at the drive': 'arrêter d’abord le moteur par le bus, ce qui dit à qui il prend la commande, ou réarmer le défaut au variateur',
