@@ -77,7 +77,7 @@ impl Fleet {
 pub struct GroupStart {
     /// The direction.
     pub direction: Direction,
-    /// The setpoint for each; `None`: what each holds.
+    /// The setpoint for each; `None`: what each was given last, or else what it holds.
     pub setpoint: Option<Setpoint>,
     /// From one start to the next at the least; zero: as close together as the lines allow, all setpoints first.
     pub spacing: Duration,

@@ -282,7 +282,8 @@ impl DriveHandle {
         answer.await.unwrap_or_else(|_| Err(self.entry.gone()))
     }
 
-    /// Starts the motor at the setpoint that the drive holds. Confirmed when the run command shows in its words.
+    /// Starts the motor at the setpoint that this fleet gave it last, which is given anew (another master may have written the reference
+    /// since), or, where it gave none that is known, at the one that the drive holds. Confirmed when the run command shows in its words.
     pub fn start(&self, direction: Direction) -> Ticket {
         self.order(Order::Start { direction, setpoint: None, until: Until::InForce })
     }

@@ -21,11 +21,12 @@ pub enum Until {
 /// What is asked of a drive, besides a stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// Start in a direction, at a setpoint that is given first, or at the one that the drive holds.
+    /// Start in a direction, at a setpoint that is given first: this one, or the one that was given last, or else at the one that the drive
+    /// holds.
     Start {
         /// The direction.
         direction: Direction,
-        /// The setpoint.
+        /// The setpoint; `None`: the one that was given last.
         setpoint: Option<Setpoint>,
         /// When it counts as done.
         until: Until,
@@ -51,6 +52,14 @@ impl Order {
     /// Whether it can move a motor.
     pub(crate) const fn is_motion(&self) -> bool {
         matches!(self, Self::Start { .. } | Self::Setpoint { .. })
+    }
+
+    /// The setpoint that it gives.
+    pub(crate) const fn setpoint(&self) -> Option<Setpoint> {
+        match *self {
+            Self::Setpoint { setpoint, .. } => Some(setpoint),
+            _ => self.start_setpoint(),
+        }
     }
 
     /// The setpoint that a start is given with.

@@ -155,6 +155,8 @@ pub(crate) struct Supervisor {
     stopping: Option<Stopping>,
     /// How many stops were asked of it.
     stops: u64,
+    /// When the setpoint was asked for that counts, by a start or by itself.
+    setpoint_asked_at: Option<Instant>,
     withdrawal: Option<Withdrawal>,
     exit: Exit,
     /// Why it ends.
@@ -240,6 +242,7 @@ impl Supervisor {
             questions: Questions::new(),
             stopping: None,
             stops: 0,
+            setpoint_asked_at: None,
             withdrawal: None,
             exit: Exit::No,
             exits_by: Policy::Exit,
@@ -601,7 +604,7 @@ impl Supervisor {
     /// What a contract with the drive rests on has changed without this side.
     pub(crate) fn handle_changed(&mut self, now: Instant, ground: Ground) {
         self.checks.changed(now, ground);
-        if matches!(ground, Ground::Units | Ground::Limits) {
+        if ground == Ground::Units {
             // What it was counted in, or may be, is not what it was when it was given.
             self.given = None;
         }

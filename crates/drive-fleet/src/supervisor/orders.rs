@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use drive_core::{Direction, Error, Setpoint, StopMode};
+use drive_core::{Error, Setpoint, StopMode};
 use tokio::time::Instant;
 
 use super::{Asker, CallId, Expiry, Job, Leave, Lifetime, Supervisor, permission::Blocked};
@@ -16,8 +16,8 @@ use crate::{
 pub(super) struct Queued {
     pub(super) asker: Asker,
     pub(super) order: Order,
-    /// The direction of the start that it prepares, of a group that has leave for one.
-    before: Option<Direction>,
+    /// The leave for the start that it prepares, or is, of a group.
+    before: Option<Leave>,
     /// When it may not be sent any more.
     pub(super) expires: Expiry,
 }
@@ -27,8 +27,8 @@ pub(super) struct Queued {
 pub(super) struct Active {
     pub(super) asker: Asker,
     pub(super) order: Order,
-    /// The direction of the start that it prepares, of a group that has leave for one.
-    pub(super) before: Option<Direction>,
+    /// The leave for the start that it prepares, or is, of a group.
+    pub(super) before: Option<Leave>,
     /// When its lifetime is over.
     expiry: Expiry,
     /// The setpoint of a start, once it has been given.
@@ -99,7 +99,11 @@ impl Supervisor {
         if matches!(order, Order::Setpoint { .. }) {
             self.supersede_setpoints();
         }
-        self.enqueue(now, asker, order, leave.map(|leave| leave.direction), expires);
+        // What a group gives its members counts as asked when the group was.
+        if order.setpoint().is_some() {
+            self.setpoint_asked_at = Some(leave.map_or(now, |leave| leave.since));
+        }
+        self.enqueue(now, asker, order, leave, expires);
         // A poll gives way once; the next waits for its status, or a stream of orders would blind the fleet.
         let gives_way = self.in_flight.is_some_and(Job::is_poll) && !self.yielded;
         self.yielded |= gives_way;
@@ -174,7 +178,7 @@ impl Supervisor {
         now: Instant,
         asker: Asker,
         order: Order,
-        before: Option<Direction>,
+        before: Option<Leave>,
         expires: Option<Expiry>,
     ) {
         let expires = expires.unwrap_or(Expiry::since(now, self.settings.times.lifetime));

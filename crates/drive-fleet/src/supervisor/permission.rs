@@ -46,6 +46,8 @@ impl From<Refusal> for Blocked {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Leave {
     stops: u64,
+    /// When it was given.
+    pub(super) since: Instant,
     /// The direction of that start.
     pub(super) direction: Direction,
 }
@@ -63,7 +65,7 @@ impl Supervisor {
         match self.refuse_commander(Some(name), &order) {
             Some(refused) => Err(refused),
             None => {
-                let leave = Leave { stops: self.stops, direction };
+                let leave = Leave { stops: self.stops, since: now, direction };
                 self.allow(now, order, None).map_err(Blocked::reason)?;
                 self.driven_by_another().map_or(Ok(leave), |refusal| Err(Refused::Because(refusal)))
             }
@@ -122,6 +124,11 @@ impl Supervisor {
         if leave.is_some_and(is_over) {
             return Some(Refused::Stopped);
         }
+        // Who has been asked for another setpoint since does not come back to this one.
+        let is_older = |leave: Leave| self.setpoint_asked_at.is_some_and(|at| leave.since < at);
+        if order.setpoint().is_some() && leave.is_some_and(is_older) {
+            return Some(Refused::Superseded);
+        }
         (self.queue.len() >= QUEUE).then_some(Refused::QueueFull)
     }
 
@@ -150,15 +157,19 @@ impl Supervisor {
                     self.allow_motion(now, status, active)?;
                 }
                 self.allow_setpoint(now, setpoint)?;
-                let start = active.and_then(|active| active.before);
+                let start = active.and_then(|active| active.before).map(|leave| leave.direction);
                 Some(Job::SetSetpoint(setpoint, start.filter(|_| !self.was_just_at_rest(now))))
             }
             Order::Start { direction, setpoint, .. } => {
                 self.allow_motion(now, status, active)?;
                 // What the drive holds may be another master's by now, or counted otherwise, and the limits others than when it was given:
                 // what is shown as its setpoint is given anew.
-                let setpoint = setpoint.or(self.given.map(|given| given.setpoint));
-                if setpoint.is_none() && !self.settings.limits.is_empty() {
+                let leave = active.and_then(|active| active.before);
+                // A group has just done so.
+                let is_new = |given: &Given| leave.is_some_and(|leave| given.at >= leave.since);
+                let setpoint =
+                    setpoint.or(self.given.filter(|given| !is_new(given)).map(|given| given.setpoint));
+                if setpoint.is_none() && self.given.is_none() && !self.settings.limits.is_empty() {
                     return Err(Refused::Limit(LimitProblem::UnknownSetpoint).into());
                 }
                 match setpoint {

@@ -30,6 +30,46 @@ fn the_setpoint_of_a_group_that_starts_is_given_as_that_of_a_start_in_its_direct
     assert_eq!(rig.drive.writes(), [Job::SetSetpoint(setpoint, Some(Direction::Reverse))]);
 }
 
+/// Whoever asked for it later does not get the older one.
+#[test]
+fn the_setpoint_of_a_group_does_not_take_the_place_of_one_that_was_asked_for_since() {
+    let mut rig = Rig::ready();
+    let leave = rig.machine.leave(rig.now, "tester", Direction::Forward, None).unwrap();
+    rig.pass(100 * MS);
+    let later = rig.order(setpoint(45));
+    rig.pass(500 * MS);
+    assert!(rig.outcome(later).is_some_and(Outcome::is_confirmed));
+    let asker = rig.asker();
+    let id = asker.id().expect("it is a caller's");
+    rig.machine.handle_order(rig.now, asker, setpoint(20), Some(leave), None);
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(id), Some(&Outcome::Refused(Refused::Superseded)));
+    assert_eq!(rig.snapshot().setpoint, Some(Frequency::from_hertz(45).into()));
+}
+
+/// What is shown as its setpoint is what it is started at, whoever has written the reference since; a group has just given it.
+#[test]
+fn a_start_without_a_setpoint_gives_the_one_that_is_shown_anew_and_that_of_a_group_once() {
+    let twenty = Frequency::from_hertz(20).into();
+    let mut rig = Rig::ready();
+    rig.order(setpoint(20));
+    rig.pass(500 * MS);
+    rig.drive.reference = Some(Frequency::from_hertz(40).into());
+    rig.drive.log.clear();
+    rig.order(START);
+    rig.pass(500 * MS);
+    assert_eq!(rig.drive.writes(), [Job::SetSetpoint(twenty, None), Job::Start(Direction::Forward)]);
+
+    let mut rig = Rig::ready();
+    let leave = rig.machine.leave(rig.now, "tester", Direction::Forward, Some(twenty)).unwrap();
+    for order in [setpoint(20), START] {
+        let asker = rig.asker();
+        rig.machine.handle_order(rig.now, asker, order, Some(leave), None);
+        rig.pass(500 * MS);
+    }
+    assert_eq!(rig.drive.writes(), [Job::SetSetpoint(twenty, None), Job::Start(Direction::Forward)]);
+}
+
 /// A drive from a file whose register of the setpoint does no more than read back.
 #[test]
 fn a_start_goes_on_behind_a_setpoint_that_only_a_start_shows_and_behind_no_other_that_is_not_confirmed() {
