@@ -245,7 +245,12 @@ impl OwnRun {
             (Lack::Output, evidence.output),
             (Lack::Reference, evidence.reference),
         ];
+        // What turns the motor another way, or as fast as before, is then this side's own word of before.
+        let stood_before = !self.arrived && self.before.is_some();
         let lacking = parts.iter().find_map(|&(lack, told)| match told {
+            Told::No(_) if stood_before && lack == Lack::Reference => {
+                Some(Verdict::lacks(Lack::Command, UNSEEN))
+            }
             Told::No(because) => Some(Verdict::lacks(lack, because)),
             Told::Yes | Told::NotTold => None,
         });
@@ -329,6 +334,24 @@ mod tests {
         );
         own.end();
         assert!(!own.is_own(reverse.word));
+    }
+
+    /// A drive whose command word cannot be read goes on by the one before, and nobody else turns it.
+    #[test]
+    fn what_a_run_command_of_before_turns_is_no_others_reference_while_its_successor_was_not_seen_to_arrive()
+    {
+        const AGAINST: Refusal =
+            Refusal::Overridden { by: "whoever turns it the other way,", remedy: "see who" };
+        let turned = Evidence { word: RunWord::NotTold, reference: Told::No(AGAINST), ..IN_FORCE };
+        let mut own = given();
+        own.give(Lease::new(Direction::Reverse, 0x080F));
+        let lacks = |verdict| match verdict {
+            Some(Verdict::NotInForce { lacks, .. }) => Some(lacks),
+            _ => None,
+        };
+        assert_eq!(lacks(own.judge(&turned)), Some(Lack::Command));
+        own.was_written();
+        assert_eq!(lacks(own.judge(&turned)), Some(Lack::Reference));
     }
 
     #[test]

@@ -114,6 +114,16 @@ fn no_story_that_was_a_find_is_one_again() {
             "4.4.0.o5.f51x4.o6.o14",
             "a 3G3EV that could not complete a start the other way: what it ran by was not withdrawn",
         ),
+        (
+            "6.4.0.o6.d5x5.o6.o5.f70x4.l1",
+            "a Goodrive that goes on by its own run word of before: another was blamed for its direction",
+        ),
+        ("6.0.0.f22x4.o6.d5x26", "the same behind a damaged answer and a start whose call was dropped"),
+        ("6.0.0.o5.f72x5.o6", "the same behind a mute line"),
+        (
+            "9.3.0.o8.d5x27.d7x10",
+            "a G120 whose start and setpoint nobody waited for: another was blamed for what stood before",
+        ),
         ("5.4.0.o5.l3.o8.o10", "freewheel behind a ramp: told at rest at 5 Hz, as if the ramp had ended"),
         ("3.4.0.o13.e14.e12", "released to the terminals, which start it: the stories were wrong"),
         (

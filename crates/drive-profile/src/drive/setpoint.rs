@@ -64,7 +64,7 @@ impl<P: Port> ProfileDrive<P> {
             return Err(Error::Unsupported { what: "a setpoint", reason: "its profile has none" });
         };
         self.takes(register, setpoint)?;
-        let (status, _) = self.read_status(Class::Command).await?;
+        let (status, words) = self.read_status(Class::Command).await?;
         // Somebody may have set it up otherwise since.
         self.forget_guards();
         self.guard(order).await?;
@@ -78,7 +78,10 @@ impl<P: Port> ProfileDrive<P> {
         }
         let word = Sign::Positive.word(counts);
         let Some((_, address)) = profile.file().place(register) else { return Ok(()) };
+        // A start that nobody waited for to its end rests on what stands.
+        let stands = self.setpoint_seen(&words);
         let before = self.agree(setpoint);
+        self.agreed_before = before.or(stands);
         match self.registers.at(Class::Command).replacing(address).write_word(address, word).await {
             Err(error) if error.kind() == ErrorKind::NotSent => {
                 self.agreed = before;

@@ -77,6 +77,18 @@ impl PlannedLine {
         Case { label, forecast, stop_to_the_wire, all_stopped, hypothetical: None }
     }
 
+    /// How long a stop may wait behind a port that was just opened, where the line has to find out first whether its adapter echoes. It is what
+    /// the daemon tells as its bound until then.
+    pub(super) fn until_echo_is_known(&self) -> Option<String> {
+        let asking = self.stop_bound(&self.config);
+        (asking > self.stop_to_the_wire(&self.config)).then(|| {
+            format!(
+                "a stop that comes while the line still finds out whether its adapter echoes, behind a port that was just opened, is on the wire within {}",
+                output::bound(asking)
+            )
+        })
+    }
+
     /// What of the stop's wait is a gateway's, and where that is from; `None` where there is none.
     pub(super) fn behind_gateway(&self) -> Option<String> {
         let gateway = self.config.far_end()?;
@@ -108,7 +120,10 @@ impl PlannedLine {
 
     /// The longest wait of a stop, once the line knows whether its adapter echoes.
     fn stop_to_the_wire(&self, config: &LineConfig) -> Duration {
-        let config = LineConfig { echo: Echo::Off, ..config.clone() };
+        self.stop_bound(&LineConfig { echo: Echo::Off, ..config.clone() })
+    }
+
+    fn stop_bound(&self, config: &LineConfig) -> Duration {
         let bytes = |of: fn(&Capabilities) -> u16| {
             let most = self.drives.iter().map(|(_, demand)| of(demand.capabilities)).max();
             2 * usize::from(most.unwrap_or_default())

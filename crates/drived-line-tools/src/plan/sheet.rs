@@ -43,7 +43,7 @@ impl Sheet<'_> {
             self.line.budget.response_timeout,
         ))?;
         output::say_table(self.table())?;
-        if let Some(said) = self.line.behind_gateway() {
+        for said in [self.line.until_echo_is_known(), self.line.behind_gateway()].into_iter().flatten() {
             output::say(said)?;
         }
         for case in self.cases {
