@@ -714,7 +714,7 @@ async fn limits_that_are_lowered_at_the_keypad_in_run_are_told_and_followed() {
     plant.run_at(30).await;
     assert!(plant.machine().poke(drive_atv312::registers::HSP.address(), 400));
     plant.event("told", |kind| *kind == EventKind::ContractChanged(Ground::Limits)).await;
-    assert_eq!(plant.motor().snapshot().setpoint, None, "it may be another now");
+    assert!(plant.motor().snapshot().setpoint.is_some(), "it is what was asked");
     sleep(10 * SECOND).await;
     let outcome = plant.motor().set_setpoint(Frequency::from_hertz(45)).await;
     assert!(matches!(outcome, Outcome::Refused(_)), "{outcome}");
