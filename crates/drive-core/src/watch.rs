@@ -45,6 +45,8 @@ struct Against {
     /// The lowest output at which it was seen to, and when.
     lowest: Frequency,
     at: Instant,
+    /// When it was looked at last: a process that stood still since has not seen it go on.
+    seen: Instant,
     /// The drive says itself that it is not on its way down.
     stays: bool,
 }
@@ -107,8 +109,13 @@ impl Watch {
     ) {
         let before = self.against.filter(|before| before.lowest <= output && comes_down != Some(true));
         let stays = comes_down == Some(false);
-        let now =
-            || before.map_or(Against { lowest: output, at, stays }, |before| Against { stays, ..before });
+        let now = || {
+            before.map_or(Against { lowest: output, at, seen: at, stays }, |before| Against {
+                seen: at,
+                stays,
+                ..before
+            })
+        };
         self.against = self.is_against(direction).then(now);
     }
 
@@ -122,8 +129,8 @@ impl Watch {
             remedy: "see which one it is, and start again",
         };
         match (reference, self.against) {
-            (Told::Yes | Told::NotTold, Some(Against { at, stays, .. }))
-                if stays || at.elapsed() > TURNS_ROUND =>
+            (Told::Yes | Told::NotTold, Some(Against { at, seen, stays, .. }))
+                if stays || seen.saturating_duration_since(at) > TURNS_ROUND =>
             {
                 Told::No(AGAINST)
             }
