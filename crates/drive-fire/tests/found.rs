@@ -115,6 +115,15 @@ fn no_story_that_was_a_find_is_one_again() {
             "a 3G3EV that could not complete a start the other way: what it ran by was not withdrawn",
         ),
         (
+            "3.0.0.o19.o11.f48x4.o14.s2.o6.o9",
+            "a 312 some of whose settings were known when FSt was changed at the keypad: its fast stop was none",
+        ),
+        ("7.4.0.d6x21.f71x2.l5.d5x35", "an iG5A that goes on by its own run word of before"),
+        (
+            "6.3.0.o6.f52x5.o5",
+            "a Goodrive that answers a start the other way by 05h, and goes on by the one before",
+        ),
+        (
             "6.4.0.o6.d5x5.o6.o5.f70x4.l1",
             "a Goodrive that goes on by its own run word of before: another was blamed for its direction",
         ),

@@ -62,10 +62,8 @@ impl<P: Port> Atv312<P> {
     }
 
     async fn read_again(&mut self, class: Class, blocks: &[u16]) -> Result<()> {
-        if !self.known.settings.is_complete() {
-            return self.read_settings(class).await;
-        }
         let before = self.known.settings.selects();
+        // Of those that are not all known yet the known ones may be old as well.
         for (index, _) in BLOCKS.iter().enumerate().filter(|(_, (first, ..))| blocks.contains(first)) {
             match self.read_setting_again(class, index).await {
                 // Of so many readings one may be lost without the drive being so.
