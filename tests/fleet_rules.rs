@@ -1,6 +1,6 @@
 //! The rules of motion, each for every family that can do it, against the simulator in virtual time.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use drive_bus::{Line, LineConfig, Protocol, protocol::AsciiSettings};
 use drive_core::{
@@ -9,8 +9,8 @@ use drive_core::{
 };
 use drive_families::Family;
 use drive_fleet::{
-    ConcernKind, DriveSettings, EventKind, ExitAction, Fleet, Link, OnExit, OnFault, Outcome, Periods,
-    Received, Refused, Times, WatchdogCheck, WatchdogContract,
+    ConcernKind, DriveSettings, EventKind, ExitAction, Fleet, IdentityCheck, Link, OnExit, OnFault, Outcome,
+    Periods, Received, Refused, Times, WatchdogCheck, WatchdogContract,
 };
 use drive_sim::{Fault, Panel, SimLine, Wiring, models::atv21::Atv21};
 use drive_testing::witness::Witnesses;
@@ -277,7 +277,12 @@ async fn rule_4_motion_needs_the_drive_that_is_remembered_until_another_is_accep
         let outcome = plant.motor().start(Direction::Forward).await;
         assert_eq!(outcome, Outcome::Refused(Refused::IdentityChanged), "{family}");
         assert_eq!(Plant::writes(plant.machine()), 0, "{family}: not even its watchdog is written");
-        assert!(plant.motor().accept_identity().await.is_confirmed());
+        let IdentityCheck::Changed { found, remembered } = plant.motor().snapshot().identity.clone() else {
+            panic!("{family}")
+        };
+        let outcome = plant.motor().accept_identity(&remembered).await;
+        assert_eq!(outcome, Outcome::Refused(Refused::NotTheShown(Some(Arc::clone(&found)))), "{family}");
+        assert!(plant.motor().accept_identity(&found).await.is_confirmed());
         plant.run_at(20).await;
     })
     .await;

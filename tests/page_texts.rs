@@ -101,6 +101,7 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
         Refused::Stale,
         Refused::IdentityChanged,
         Refused::IdentityUnchecked,
+        Refused::NotTheShown(None),
         Refused::WatchdogUnverified,
         Refused::StopPending,
         Refused::Stopped,

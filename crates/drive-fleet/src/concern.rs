@@ -89,7 +89,7 @@ table! {
         "see what decides instead; the run command is withdrawn, unless that was accepted";
     /// Another drive than before answers at its address.
     IdentityChanged: "identity_changed", "another drive than before answers at its address", Alarm, false,
-        "see which drive it is, then accept its identity";
+        "see which drive it is and how it is set up, then accept it on its page or by drived accept";
     /// It is none of the family that it is configured as.
     OtherFamily: "other_family", "a drive of another family answers at its address", Alarm, false,
         "set it up as what it is: until then it is only read, and stopped when that is asked for";

@@ -12,7 +12,7 @@ use std::{
 
 use drive_bus::{Latest, Line};
 use drive_core::{
-    BroadcastWrite, Capabilities, Direction, Faults, Row, Setpoint, SlaveAddress, StopMode,
+    BroadcastWrite, Capabilities, Direction, Faults, Identity, Row, Setpoint, SlaveAddress, StopMode,
     WatchdogCapability, Written,
 };
 use tokio::{
@@ -346,9 +346,10 @@ impl DriveHandle {
     }
 
     /// Takes what the drive says it is for right from now on, after
-    /// [`IdentityChanged`](crate::EventKind::IdentityChanged).
-    pub fn accept_identity(&self) -> Ticket {
-        self.order(Order::AcceptIdentity)
+    /// [`IdentityChanged`](crate::EventKind::IdentityChanged). `shown`: what it said when somebody looked; where it says something
+    /// else by now that is refused. Nothing is sent, so that it holds for a drive that is only read too.
+    pub fn accept_identity(&self, shown: &Identity) -> Ticket {
+        self.order(Order::AcceptIdentity(shown.into()))
     }
 
     /// Saves the drive's parameters to EEPROM: refused when nothing changed, and counted

@@ -68,6 +68,7 @@ mod progress;
 mod round;
 mod runs;
 mod settings;
+mod shown_identity;
 mod shows;
 mod snapshot;
 mod stop_order;
@@ -106,6 +107,7 @@ pub use settings::{
     Alarms, Commanders, DriveSettings, Left, OnControlTaken, OnExit, OnExitAdopted, OnExitWatchdog, OnFault,
     OnLoss, Periods, RunRecord, Times,
 };
+pub use shown_identity::ShownIdentity;
 pub use shows::Shows;
 pub use snapshot::{
     Counters, Freshness, IdentityCheck, Link, OffSetpoint, PendingStop, Snapshot, Timed, Trip, WatchdogCheck,

@@ -2,9 +2,11 @@
 
 use std::{borrow::Cow, fmt, sync::Arc, time::Duration};
 
-use drive_core::{Command, Direction, Error, Frequency, Motion, Refusal, Setpoint, Status, StopMode};
+use drive_core::{
+    Command, Direction, Error, Frequency, Identity, Motion, Refusal, Setpoint, Status, StopMode,
+};
 
-use crate::{limits::LimitProblem, stop_order::StopOrder};
+use crate::{limits::LimitProblem, shown_identity::ShownIdentity, stop_order::StopOrder};
 
 /// When a start or a setpoint counts as done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -42,8 +44,8 @@ pub enum Order {
     ResetFaults,
     /// Give control back to the panel or the terminals.
     Release,
-    /// Take what the drive says it is for right from now on.
-    AcceptIdentity,
+    /// Take what the drive says it is for right from now on, if that is still what was shown. Nothing is sent.
+    AcceptIdentity(ShownIdentity),
     /// Save the drive's parameters to EEPROM.
     Persist,
 }
@@ -86,7 +88,7 @@ impl Order {
             Self::Setpoint { setpoint, .. } => Command::Setpoint(setpoint),
             Self::ResetFaults => Command::ResetFaults,
             Self::Release => Command::Release,
-            Self::AcceptIdentity => Command::Configure("accepting the identity"),
+            Self::AcceptIdentity(_) => Command::Configure("accepting the identity"),
             Self::Persist => Command::Persist,
         }
     }
@@ -554,6 +556,8 @@ pub enum Refused {
     Because(Refusal),
     /// It says that it is another drive than before; accept that first.
     IdentityChanged,
+    /// It is none of those that were to be accepted: what it says that it is; `None`: nothing.
+    NotTheShown(Option<Arc<Identity>>),
     /// It says that it is of another family than it is configured as: what it is, and which family fits.
     OtherFamily(Cow<'static, str>),
     /// What it is could not be checked in time since it was connected.
@@ -591,6 +595,7 @@ impl Refused {
             Self::Stale => "stale",
             Self::Because(reason) => reason.word(),
             Self::IdentityChanged | Self::IdentityUnchecked | Self::OtherFamily(_) => "identity",
+            Self::NotTheShown(_) => "not_as_shown",
             Self::WatchdogUnverified => "watchdog",
             Self::StopPending => "stop_pending",
             Self::Stopped => "stop",
@@ -630,6 +635,10 @@ impl fmt::Display for Refused {
             Self::Because(reason) => reason.fmt(f),
             Self::IdentityChanged => {
                 f.write_str("it is another drive than before: accept its identity first")
+            }
+            Self::NotTheShown(Some(now)) => write!(f, "it is not the drive that was shown: it is {now} now"),
+            Self::NotTheShown(None) => {
+                f.write_str("it does not say which drive it is: there is nothing to accept")
             }
             Self::OtherFamily(it_is) => write!(f, "it is none of the family that it is set up as: {it_is}"),
             Self::IdentityUnchecked => f.write_str("it has not been possible to check which drive it is"),

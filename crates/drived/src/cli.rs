@@ -15,7 +15,8 @@ use drived_daemon::demo;
 use drived_daemon::run;
 use drived_line_tools::{capture, doctor, explain, families, init, plan, poll, replay, scan, sim};
 use drived_tools::commands::{
-    alarms, faults, monitor, param, release, reload, report, reset, setpoint, start, status, stop, watch,
+    accept, alarms, faults, monitor, param, release, reload, report, reset, setpoint, start, status, stop,
+    watch,
 };
 use drived_words::{failure::Failure, output};
 
@@ -26,7 +27,8 @@ Before wiring:      families, plan
 A drive from a file: profile list, show, check, new, try
 A drive, read:      status, faults, param get, param dump
 A drive, write:     setpoint, start, stop, reset, release, param set, param save
-The running daemon: all these without --line and with the names of its drives; alarms, watch, monitor, reload
+The running daemon: all these without --line and with the names of its drives; accept, alarms, watch,
+                    monitor, reload
 One line, read:     scan, poll, doctor, monitor; init writes a configuration from a scan
 What went over it:  capture, explain; replay plays it back
 What happened:      history, and why at a moment
@@ -71,6 +73,7 @@ pub(crate) enum Command {
     Setpoint(setpoint::Args),
     Faults(faults::Args),
     Reset(reset::Args),
+    Accept(accept::Args),
     Release(release::Args),
     #[command(subcommand)]
     Param(param::Command),
@@ -145,6 +148,7 @@ impl Command {
             Self::Setpoint(args) => setpoint::run(args).await,
             Self::Faults(args) => faults::run(args).await,
             Self::Reset(args) => reset::run(args).await,
+            Self::Accept(args) => accept::run(args).await,
             Self::Release(args) => release::run(args).await,
             Self::Param(command) => param::run(command).await,
             Self::Families(args) => families::run(&args),

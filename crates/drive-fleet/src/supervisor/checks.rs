@@ -13,6 +13,7 @@ use crate::{
     event::EventKind,
     outcome::Refused,
     settings::DriveSettings,
+    shown_identity::ShownIdentity,
     snapshot::{IdentityCheck, WatchdogCheck},
     supervisor::Job,
     watchdog::{WatchdogBefore, WatchdogContract},
@@ -422,6 +423,17 @@ impl Checks {
         self.restarts = Some(Arc::clone(&by));
         let accepted = self.restarts_accepted();
         (!by.is_empty()).then_some(EventKind::RestartsItself { by, accepted })
+    }
+
+    /// Why the drive that somebody was shown is not accepted; `None`: it is the one that answers.
+    pub(crate) fn refuses_to_accept(&self, shown: ShownIdentity) -> Option<Refused> {
+        match &self.identity {
+            IdentityCheck::Changed { found, .. } | IdentityCheck::Same(found) => {
+                (!shown.is(found)).then(|| Refused::NotTheShown(Some(Arc::clone(found))))
+            }
+            IdentityCheck::CannotSay => Some(Refused::NotTheShown(None)),
+            IdentityCheck::Unchecked | IdentityCheck::OtherFamily { .. } => self.stranger(),
+        }
     }
 
     /// Takes what the drive says it is for right.

@@ -268,7 +268,7 @@ impl Supervisor {
                     return Some((job, None));
                 }
                 Ok(None) => {
-                    if order == Order::AcceptIdentity {
+                    if matches!(order, Order::AcceptIdentity(_)) {
                         self.checks.accept_identity();
                     }
                     self.end_order(Outcome::Confirmed);

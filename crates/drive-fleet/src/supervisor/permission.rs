@@ -92,7 +92,9 @@ impl Supervisor {
 
     /// Why nobody of this name may give this order now.
     fn refuse_commander(&self, name: Option<&str>, order: &Order) -> Option<Refused> {
-        if crate::mutant!("read-only-moved", !self.settings.control, false) {
+        // Nothing is sent by it, and whoever only reads a drive is told as well that it is another.
+        let accepts = matches!(order, Order::AcceptIdentity(_));
+        if crate::mutant!("read-only-moved", !self.settings.control && !accepts, false) {
             return Some(Refused::ReadOnly);
         }
         if self.is_exiting() {
@@ -101,8 +103,7 @@ impl Supervisor {
         if let Some(name) = name.filter(|name| !self.settings.commanders.allow(name)) {
             return Some(Refused::Commander(name.to_owned()));
         }
-        (crate::mutant!("start-amid-a-stop", self.stopping.is_some(), false)
-            && *order != Order::AcceptIdentity)
+        (crate::mutant!("start-amid-a-stop", self.stopping.is_some(), false) && !accepts)
             .then_some(Refused::StopPending)
     }
 
@@ -142,7 +143,10 @@ impl Supervisor {
         self.allow_writing(now, order)?;
         let status = self.status.as_ref().map(|status| &*status.value).ok_or(Refused::NotConnected)?;
         Ok(match order {
-            Order::AcceptIdentity => None,
+            Order::AcceptIdentity(shown) => match self.checks.refuses_to_accept(shown) {
+                Some(refused) => return Err(refused.into()),
+                None => None,
+            },
             // Its driver looks whether there is a fault: the last status may be older than a trip.
             Order::ResetFaults => Some(Job::ResetFaults),
             Order::Release => Some(Job::Release),
@@ -212,7 +216,7 @@ impl Supervisor {
         }
         match crate::mutant!("stranger-moved", self.checks.stranger(), None) {
             None => Ok(()),
-            Some(Refused::IdentityChanged) if order == Order::AcceptIdentity => Ok(()),
+            Some(Refused::IdentityChanged) if matches!(order, Order::AcceptIdentity(_)) => Ok(()),
             Some(unchecked @ Refused::IdentityUnchecked) => Err(match self.checks.identity_job(now) {
                 Some(job) => Blocked::Until(job, unchecked),
                 None => Blocked::Meanwhile(unchecked),

@@ -25,7 +25,7 @@ use drived_doors::{
 use drived_plant::plant::{
     Plant,
     alarms::AlarmsView,
-    commands::{NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
+    commands::{Accept, NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
     history::{CurvesView, HistoryView},
     parameters::{ParameterView, WrittenView},
     past::{
@@ -577,6 +577,11 @@ fn commands() -> Vec<Route> {
             "/api/v1/drives/{name}/save",
             command::to_drive::<Save>,
             "Saves the parameters of a drive to its EEPROM",
+        ),
+        Route::command::<_, _, Accept>(
+            "/api/v1/drives/{name}/accept",
+            command::to_drive::<Accept>,
+            "Accepts a drive that says it is another than before",
         ),
         Route::write(
             "/api/v1/drives/{name}/parameters/{register}",

@@ -148,6 +148,7 @@ impl Inner {
                 | Command::ResetFaults
                 | Command::Release
                 | Command::Persist
+                | Command::Configure(_)
         );
         let commanders = self.recent.commanders.lock().unwrap_or_else(PoisonError::into_inner);
         is_asked_for && commanders.contains(&**commander)

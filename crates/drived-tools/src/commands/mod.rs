@@ -1,5 +1,6 @@
 //! The subcommands, one module each.
 
+pub mod accept;
 pub mod alarms;
 pub mod faults;
 pub mod monitor;

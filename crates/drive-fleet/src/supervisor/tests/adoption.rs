@@ -261,9 +261,7 @@ fn a_drive_of_another_family_is_read_and_stopped_and_nothing_else_is_written_to_
     rig.drive.run();
     rig.pass(2_000 * MS);
     assert_eq!(rig.snapshot().status.as_ref().map(|status| status.value.state), Some(State::Running));
-    for order in
-        [START, setpoint(20), Order::ResetFaults, Order::Release, Order::Persist, Order::AcceptIdentity]
-    {
+    for order in [START, setpoint(20), Order::ResetFaults, Order::Release, Order::Persist, accept_of("")] {
         let id = rig.order(order);
         rig.pass(1_500 * MS);
         assert!(

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    Periods,
+    ConcernKind, Periods,
     snapshot::{Freshness, WatchdogCheck},
 };
 
@@ -93,12 +93,47 @@ fn another_drive_at_the_address_is_not_moved_until_it_is_accepted() {
     rig.pass(500 * MS);
     assert_eq!(rig.outcome(start), Some(&Outcome::Refused(Refused::IdentityChanged)));
     assert_eq!(rig.drive.writes(), []);
-    let accept = rig.order(Order::AcceptIdentity);
+    let accept = rig.order(accept_of("two"));
     rig.pass(500 * MS);
     assert_eq!(rig.outcome(accept), Some(&Outcome::Confirmed));
     let start = rig.order(START);
     rig.pass(500 * MS);
     assert!(rig.outcome(start).is_some_and(Outcome::is_confirmed));
+}
+
+#[test]
+fn a_drive_that_was_exchanged_once_more_is_not_accepted_by_what_the_one_before_it_said() {
+    let mut rig = exchanged(Rig::ready());
+    rig.pass(1_000 * MS);
+    rig.drive.identity.model = Some("three".to_owned());
+    line_lost(&mut rig);
+    // Given before it has said so: it waits for that.
+    let accept = rig.order(accept_of("two"));
+    rig.pass(1_000 * MS);
+    let now = Identity { model: Some("three".to_owned()), ..Identity::default() };
+    let refused = Refused::NotTheShown(Some(Arc::new(now)));
+    assert_eq!(rig.outcome(accept), Some(&Outcome::Refused(refused)));
+    let start = rig.order(START);
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(start), Some(&Outcome::Refused(Refused::IdentityChanged)));
+    let accept = rig.order(accept_of("three"));
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(accept), Some(&Outcome::Confirmed));
+}
+
+/// Nothing is sent by it, and nothing else takes its alarm away.
+#[test]
+fn another_drive_that_is_only_read_is_accepted_too() {
+    let mut rig = Rig::new(DriveSettings { watchdog: None, control: false, ..settings() });
+    rig.pass(2_000 * MS);
+    let mut rig = exchanged(rig);
+    rig.pass(2_000 * MS);
+    let trouble = |rig: &Rig| rig.snapshot().concern(rig.now).map(|worst| worst.kind);
+    assert_eq!(trouble(&rig), Some(ConcernKind::IdentityChanged));
+    let accept = rig.order(accept_of("two"));
+    rig.pass(500 * MS);
+    assert_eq!((rig.outcome(accept), trouble(&rig)), (Some(&Outcome::Confirmed), None));
+    assert_eq!(rig.drive.writes(), []);
 }
 
 #[test]
@@ -698,7 +733,7 @@ fn a_drive_that_was_exchanged_between_two_polls_is_told_and_not_started_until_it
     let refused = rig.order(run_at(20));
     rig.pass(500 * MS);
     assert_eq!(rig.outcome(refused), Some(&Outcome::Refused(Refused::IdentityChanged)));
-    rig.order(Order::AcceptIdentity);
+    rig.order(accept_of("two"));
     let started = rig.order(START);
     rig.pass(500 * MS);
     assert!(rig.outcome(started).is_some_and(Outcome::is_confirmed), "{:?}", rig.outcome(started));
@@ -737,7 +772,7 @@ fn a_stop_is_not_confirmed_by_another_drive_at_rest_than_the_one_that_was_to_be_
     let other = again.stop(StopMode::Ramp);
     again.pass(2_000 * MS);
     assert!(again.outcome(other).is_some_and(Outcome::is_confirmed), "{:?}", again.outcome(other));
-    rig.order(Order::AcceptIdentity);
+    rig.order(accept_of("two"));
     rig.pass(2_000 * MS);
     assert!(rig.events().contains(&"stop confirmed"));
 }

@@ -558,6 +558,11 @@ fn run_at(hertz: u16) -> Order {
     Order::Start { direction: Direction::Forward, setpoint, until: Until::AtReference }
 }
 
+/// Who has seen a drive of this model accepts it.
+fn accept_of(model: &str) -> Order {
+    Order::AcceptIdentity((&Identity { model: Some(model.to_owned()), ..Identity::default() }).into())
+}
+
 fn setpoint(hertz: u16) -> Order {
     Order::Setpoint { setpoint: Frequency::from_hertz(hertz).into(), until: Until::InForce }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use axum::http::Method;
-use drive_core::{Frequency, State};
+use drive_core::{Frequency, Identity, State};
 use drive_fleet::{Band, DriveSettings, FrequencyLimits};
 use serde_json::json;
 use tokio::time::{Instant, sleep, timeout};
@@ -325,6 +325,40 @@ async fn a_group_whose_drive_has_left_is_not_started_and_nobody_else_for_it_but_
     let (_, stopped) = command(&plant.plant, "/api/v1/groups/pumps/stop?wait=30s", &Value::Null).await;
     assert_eq!((&stopped["outcome"], &stopped["confirmed"]), (&"confirmed".into(), &2.into()), "{stopped}");
     assert!(!is_running(&plant, 1));
+}
+
+#[tokio::test(start_paused = true)]
+async fn another_drive_than_before_is_accepted_by_an_engineer_as_it_was_shown_and_started_then() {
+    let remembered = Identity { model: Some("another".to_owned()), ..Identity::default() };
+    let plant = TestPlant::with(1, |name| DriveSettings {
+        identity: Some(remembered.clone()),
+        ..DriveSettings::controlled(name)
+    })
+    .await;
+    let accept = "/api/v1/drives/pump%201/accept";
+    let (_, drive) = get(&plant.plant, "/api/v1/drives/pump%201").await;
+    let shown = drive["identity"].clone();
+    assert_eq!(shown["check"], "changed", "{drive}");
+    let (status, refused) = command(&plant.plant, RUN, &json!({})).await;
+    assert_eq!((status, &refused["reason"]), (StatusCode::CONFLICT, &"identity".into()), "{refused}");
+    let operator = api(&plant.plant, "operator", Rights { engineer: false, ..ALL });
+    assert_eq!(send(operator, post(accept, &json!({"identity": shown}))).await.0, StatusCode::FORBIDDEN);
+    assert_eq!(command(&plant.plant, accept, &json!({})).await.0, StatusCode::UNPROCESSABLE_ENTITY);
+    let (status, other) = command(&plant.plant, accept, &json!({"identity": remembered})).await;
+    assert_eq!((status, &other["reason"]), (StatusCode::CONFLICT, &"not_as_shown".into()), "{other}");
+    let (status, still) = command(&plant.plant, RUN, &json!({})).await;
+    assert_eq!((status, &still["reason"]), (StatusCode::CONFLICT, &"identity".into()), "{still}");
+    let (status, accepted) = command(&plant.plant, accept, &json!({"identity": shown})).await;
+    assert_eq!((status, &accepted["outcome"]), (StatusCode::OK, &"confirmed".into()), "{accepted}");
+    assert_eq!(accepted["action"], "accept");
+    let (_, drive) = get(&plant.plant, "/api/v1/drives/pump%201").await;
+    assert_eq!(drive["identity"]["check"], "same", "{drive}");
+    assert!(!is_running(&plant, 0), "nothing of before is carried out by it");
+    let (_, recent) = get(&plant.plant, "/api/v1/events/recent").await;
+    let told =
+        recent.as_array().unwrap().iter().filter(|one| one.to_string().contains("accepting the identity"));
+    assert_eq!(told.count(), 2, "each by its command alone: {recent}");
+    assert_eq!(command(&plant.plant, RUN, &json!({})).await.0, StatusCode::OK);
 }
 
 #[tokio::test(start_paused = true)]

@@ -13,10 +13,13 @@ import { t } from './texts.js';
 import { told } from './told.js';
 import { faultText } from './trouble.js';
 import { word } from './vocabulary.js';
-import { setpointText } from './words.js';
+import { identityText, setpointText } from './words.js';
 
 const STOPS = ['ramp', 'fast', 'freewheel', 'dc_injection'];
 const SHOWN = 6;
+
+/** Whether it says that it is another drive than before. */
+const isAnother = drive => drive?.identity?.check === 'changed';
 
 /** The panel of commands of the drive `name`: `element`, `update(drive)`, `end()`. */
 export function ordersPanel(name) {
@@ -30,6 +33,7 @@ export function ordersPanel(name) {
   const stop = button('stop', () => order('stop', { mode: mode.value }), { 'data-order': 'stop' });
   const reset = button('reset', askReset, { 'data-order': 'reset' });
   const release = button('release', async () => await confirmed(own, t('confirm_release', { drive: name }), t('release')) && order('release'));
+  const accept = button('accept', askAccept, { 'data-order': 'accept' });
   const moving = [setpoint.element, el('div.pair', {}, forward, reverse)];
   const stopping = el('div.pair', {}, stop, mode);
   const settling = el('div.pair', {}, reset, release);
@@ -37,7 +41,7 @@ export function ordersPanel(name) {
   const why = el('p.hint.why');
   const latest = el('ul.latest');
   const element = el('section.panel.orders', { 'aria-label': t('orders') },
-    el('h2', {}, t('orders')), ...moving, stopping, settling, why, logIn,
+    el('h2', {}, t('orders')), ...moving, stopping, settling, accept, why, logIn,
     el('h3', {}, t('latest_orders')), latest);
   const forget = onOrder(one => one.to === name && writeLatest());
   writeLatest();
@@ -50,6 +54,7 @@ export function ordersPanel(name) {
     const may = mayCommand(drive);
     for (const one of [...moving, settling]) one.hidden = !may;
     stopping.hidden = !plant.daemon.rights.stop;
+    accept.hidden = !may || !plant.daemon.rights.engineer || !isAnother(drive);
     logIn.hidden = may || readOnly;
     setpoint.update(drive);
     for (const one of [forward, reverse]) one.disabled = readOnly || Boolean(drive.start_refused);
@@ -79,6 +84,19 @@ export function ordersPanel(name) {
       return now !== fault && t('now_fault', { drive: name, fault: now });
     };
     if (await confirmed(own, t('confirm_reset', { drive: name, fault }), t('reset'), { changed })) order('reset');
+  }
+
+  async function askAccept() {
+    const { identity } = plant.drives.get(name);
+    const now = identityText(identity);
+    const changed = () => {
+      const drive = plant.drives.get(name);
+      if (!isAnother(drive)) return t('now_no_other', { drive: name });
+      const is = identityText(drive.identity);
+      return is !== now && t('now_identity', { drive: name, now: is });
+    };
+    const question = t('confirm_accept', { drive: name, now, before: identityText(identity.remembered) });
+    if (await confirmed(own, question, t('accept'), { changed })) order('accept', { identity });
   }
 
   function order(action, body = {}) {

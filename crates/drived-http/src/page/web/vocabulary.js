@@ -62,6 +62,7 @@ const WORDS = {
   setpoint: ['Setpoint', 'Consigne'],
   reset: ['Reset', 'Acquittement'],
   release: ['Give control back', 'Rendre la main'],
+  accept: ['Accept the drive', 'Accepter le variateur'],
   parameter: ['Parameter', 'Paramètre'],
   // Kinds of stop.
   ramp: ['along the ramp', 'sur rampe'],

@@ -18,6 +18,7 @@ const COMMANDS = [
   [/^fault reset$/, () => 'acquittement du défaut'],
   [/^withdrawal of the run command$/, () => 'retrait de l’ordre de marche'],
   [/^release$/, () => 'rendre la main'],
+  [/^accepting the identity$/, () => 'acceptation de l’identité'],
 ];
 
 /** The plain word for an outcome. */
@@ -34,6 +35,11 @@ export function command(given) {
     if (found) return french(...found.slice(1));
   }
   return said;
+}
+
+/** What a drive says that it is, as it is accepted by `drived accept` too. */
+export function identityText({ vendor, model, firmware, codes = [] } = {}) {
+  return [vendor, model, firmware, ...codes.map(({ code, value }) => `${code} ${value}`)].filter(Boolean).join(' ');
 }
 
 /** What happened, without the kind of event that stands before it. */

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::{Direction, Setpoint, StopMode};
+use drive_core::{Direction, Identity, Setpoint, StopMode};
 use drive_fleet::Until;
 use schemars::JsonSchema;
 use serde::{Deserialize, de::DeserializeOwned};
@@ -164,6 +164,33 @@ pub struct Save(Plain);
 #[derive(Debug, Deserialize)]
 #[serde(transparent)]
 pub struct Release(Plain);
+
+/// Takes what a drive says it is for right, where that is another one than before. Nothing is sent to it.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Accept {
+    /// The caller's name of the command: one that comes again within ten minutes is answered, and not repeated.
+    #[schemars(length(min = 1, max = LONGEST_ID))]
+    id: Option<String>,
+    /// After this time from its arrival it is not done any more; 1000 unless it is said.
+    #[schemars(range(min = 1, max = 10_000))]
+    expires_in_ms: Option<u64>,
+    /// When it was issued, by a clock that agrees with the daemon's: its time counts from then, and a stop since then goes before it.
+    issued_unix_ms: Option<u64>,
+    /// What was shown of the drives: it is carried out so, or refused.
+    expects: Option<Expects>,
+    /// What the drive says that it is, as the `identity` of its state has shown it: where it says something else by now, that is refused
+    /// with the reason `not_as_shown`. What stands there besides, such as the `check`, is not looked at.
+    identity: Identity,
+}
+
+impl Asks for Accept {
+    fn asked(self) -> Asked {
+        let Self { id, expires_in_ms, issued_unix_ms, expects, identity } = self;
+        let action = Action::Accept((&identity).into());
+        Asked { id, expires_in_ms, issued_unix_ms, expects, action }
+    }
+}
 
 impl Asks for Start {
     fn asked(self) -> Asked {

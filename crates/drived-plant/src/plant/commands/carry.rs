@@ -435,6 +435,7 @@ fn order(action: Action) -> Option<Order> {
         Action::Reset => Order::ResetFaults,
         Action::Release => Order::Release,
         Action::Save => Order::Persist,
+        Action::Accept(shown) => Order::AcceptIdentity(shown),
         Action::Stop(_) => return None,
     })
 }

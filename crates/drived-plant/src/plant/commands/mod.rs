@@ -19,7 +19,7 @@ use std::{
 };
 
 use drive_core::{Direction, Setpoint};
-use drive_fleet::{DriveHandle, Place, StopOrder, Until};
+use drive_fleet::{DriveHandle, Place, ShownIdentity, StopOrder, Until};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::{
@@ -29,7 +29,7 @@ use tokio::{
 
 pub(super) use self::log::Log;
 pub use self::{
-    body::{Asked, Asks, NewSetpoint, Plain, Release, Reset, Save, Start, Stop, is_id},
+    body::{Accept, Asked, Asks, NewSetpoint, Plain, Release, Reset, Save, Start, Stop, is_id},
     expected::{Expects, Otherwise},
     log::Told,
     outcome::OutcomeWord,
@@ -108,6 +108,8 @@ pub enum Action {
     Release,
     /// To EEPROM.
     Save,
+    /// Another drive than before, which says that it is this one.
+    Accept(ShownIdentity),
 }
 
 /// Why a command is not taken at all.
@@ -167,6 +169,7 @@ pub enum ActionWord {
     Reset,
     Release,
     Save,
+    Accept,
 }
 
 impl ActionWord {
@@ -178,6 +181,7 @@ impl ActionWord {
             Self::Reset => "reset",
             Self::Release => "release",
             Self::Save => "save",
+            Self::Accept => "accept",
         }
     }
 }
@@ -191,6 +195,7 @@ impl Action {
             Self::Reset => ActionWord::Reset,
             Self::Release => ActionWord::Release,
             Self::Save => ActionWord::Save,
+            Self::Accept(_) => ActionWord::Accept,
         }
     }
 
@@ -205,6 +210,7 @@ impl Action {
             Self::Reset => "fault reset".to_owned(),
             Self::Release => "release".to_owned(),
             Self::Save => "save to EEPROM".to_owned(),
+            Self::Accept(_) => "accepting the identity".to_owned(),
         }
     }
 }
@@ -272,6 +278,8 @@ impl Plant {
         let (has_right, right) = match request.action {
             Action::Stop(_) => (caller.rights.stop, "stop"),
             Action::Save => (caller.rights.engineer, "save parameters"),
+            // Who may start a motor does not say by that how another drive is set up for it.
+            Action::Accept(_) => (caller.rights.engineer, "accept another drive"),
             _ => (caller.rights.operate, "operate"),
         };
         if !has_right {

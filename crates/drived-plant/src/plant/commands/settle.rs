@@ -35,7 +35,7 @@ fn verdict_of(action: Action, snapshot: &Snapshot, ended: Instant) -> Option<Out
         Action::Reset if status.is_explained() => either(!status.is_fault()),
         Action::Reset => None,
         Action::Release => status.control.and_then(|control| either(control != Control::Bus)),
-        Action::Save => None,
+        Action::Save | Action::Accept(_) => None,
         Action::Setpoint { setpoint, .. } => {
             let measured = snapshot.measurements.as_ref().filter(|measured| measured.at > ended)?;
             measured.value.reference.and_then(|reference: Setpoint| either(reference == setpoint))
