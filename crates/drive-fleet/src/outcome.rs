@@ -250,16 +250,17 @@ impl Outcome {
         }
     }
 
-    /// Its kind in words, for logs.
+    /// The same in words, for logs and the audit log.
     #[must_use]
     pub const fn kind(&self) -> &'static str {
-        match self {
-            Self::Confirmed | Self::Started(_) | Self::Stopped(_) => "confirmed",
-            Self::NothingStood => "nothing to be done",
-            Self::NotConfirmed(_) => "not confirmed",
-            Self::Expired => "expired",
-            Self::OutcomeUnknown(_) => "outcome unknown",
-            Self::Refused(_) => "refused",
+        match self.became() {
+            Became::Confirmed => "confirmed",
+            Became::NotConfirmed => "not confirmed",
+            Became::Unknown => "outcome unknown",
+            Became::Refused => "refused",
+            Became::Expired => "expired",
+            Became::Superseded => "superseded",
+            Became::Nothing => "nothing to be done",
         }
     }
 }
@@ -532,7 +533,7 @@ impl fmt::Display for Unconfirmed {
                 last.as_ref().map_or(Ok(()), |last| write!(f, "; the drive was last seen {last}"))
             }
             Self::Superseded => f.write_str("a later command took its place"),
-            Self::Stopped => f.write_str("a stop came"),
+            Self::Stopped => f.write_str("a stop came while it was carried out"),
             Self::Withdrawn => f.write_str("it was withdrawn"),
             Self::Tripped => f.write_str("the drive tripped"),
             Self::Lost => f.write_str("the drive was lost"),

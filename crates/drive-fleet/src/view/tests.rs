@@ -207,6 +207,7 @@ fn an_outcome_is_one_of_seven_words_with_its_reason() {
         ),
         (Outcome::OutcomeUnknown(Unknown { abandoned: true, ..Unknown::default() }), "unknown", None),
         (Outcome::NotConfirmed(Unconfirmed::Superseded), "superseded", Some("later_command")),
+        (Outcome::NotConfirmed(Unconfirmed::Stopped), "superseded", Some("stop")),
         (Outcome::Refused(Refused::Superseded), "superseded", Some("later_command")),
         (Outcome::Refused(Refused::Stopped), "superseded", Some("stop")),
         (Outcome::Refused(Refused::Commander("guest".to_owned())), "refused", Some("no_right")),
@@ -225,6 +226,9 @@ fn an_outcome_is_one_of_seven_words_with_its_reason() {
         let told = to_value(&outcome).unwrap();
         assert_eq!((&told["outcome"], told.get("reason")), (&json!(word), reason.map(Value::from).as_ref()));
         assert_eq!(told.get("text").is_some(), word != "confirmed", "{told}");
+        // The log, the audit log and the text of its event have the same.
+        let said = outcome.to_string().replace(' ', "_");
+        assert!(said.split(':').next().is_some_and(|kind| kind.contains(word)), "{word}: {said}");
     }
     is(
         Outcome::Started(Started {

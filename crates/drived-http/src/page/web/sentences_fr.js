@@ -100,7 +100,7 @@ export const SENTENCES_FR = {
   // What became of it.
   'a later command took its place': 'un ordre ultérieur l’a remplacé',
   'it was withdrawn': 'il a été retiré',
-  'a stop came': 'un arrêt est arrivé',
+  'a stop came while it was carried out': 'un arrêt est arrivé pendant son exécution',
   'the drive tripped': 'le variateur est passé en défaut',
   'the drive was lost': 'la liaison avec le variateur a été perdue',
   'nothing has confirmed it yet': 'rien ne l’a encore confirmé',

@@ -46,7 +46,7 @@ const WORDS = {
   outcome_unknown: ['outcome unknown', 'issue inconnue'],
   refused: ['refused', 'refusé'],
   expired: ['expired', 'expiré'],
-  superseded: ['superseded by a later command', 'remplacé par un ordre ultérieur'],
+  superseded: ['superseded', 'remplacé'],
   nothing: ['nothing to be done', 'rien à faire'],
   // The life of an alarm.
   unacknowledged: ['not acknowledged', 'non prise en compte'],

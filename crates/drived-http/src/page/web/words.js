@@ -51,7 +51,7 @@ export function eventText(happened) {
   const rest = text.startsWith(kind) ? text.slice(kind.length).replace(/^[:,]? /, '') : text;
   const change = rest.match(/^(\w+) to (\w+)$/);
   if (change) return `${word(change[1])} → ${word(change[2])}`;
-  const given = rest.match(/^(.+) by (.+?): (confirmed|not confirmed|outcome unknown|refused|expired)(?:: (.+))?$/);
+  const given = rest.match(/^(.+) by (.+?): (confirmed|not confirmed|outcome unknown|refused|expired|superseded|nothing to be done)(?:: (.+))?$/);
   if (given) {
     const [, what, who, how, why] = given;
     const became = why ? named(outcome(how), told(why)) : outcome(how);

@@ -8,7 +8,6 @@ pub(super) fn outcome(word: OutcomeWord) -> String {
     match word {
         OutcomeWord::NotConfirmed => "NOT confirmed".to_owned(),
         OutcomeWord::Unknown => "outcome unknown".to_owned(),
-        OutcomeWord::Superseded => "superseded by a later command".to_owned(),
         OutcomeWord::Nothing => "nothing to be done".to_owned(),
         word => word.to_string(),
     }
