@@ -3,7 +3,10 @@
 use std::{
     borrow::Cow,
     collections::HashMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
 
@@ -125,6 +128,8 @@ struct Inner {
     parts: Mutex<Vec<Arc<CommandView>>>,
     /// One of them has changed.
     changed: Notify,
+    /// And that has not been told yet.
+    is_untold: AtomicBool,
     /// What holds for all of them.
     head: CommandView,
 }
@@ -160,7 +165,16 @@ impl Work {
         let parts = Mutex::new(parts);
         let request = request.clone();
         let numbers = group.members().iter().map(|member| Arc::clone(member.name())).zip(0..).collect();
-        Self(Arc::new(Inner { plant, request, group, numbers, parts, changed: Notify::new(), head }))
+        Self(Arc::new(Inner {
+            plant,
+            request,
+            group,
+            numbers,
+            parts,
+            changed: Notify::new(),
+            is_untold: AtomicBool::new(false),
+            head,
+        }))
     }
 
     fn members(&self) -> &[DriveHandle] {
@@ -217,6 +231,7 @@ impl Work {
     }
 
     pub(super) fn tell(&self, command: &Command) {
+        self.0.is_untold.store(false, Ordering::SeqCst);
         let view = Arc::new(self.view());
         let before = Arc::clone(&command.borrow());
         self.0.plant.0.tell_command(&view, Some(&before));
@@ -229,7 +244,10 @@ impl Work {
             self.0.changed.notified().await;
             let parts = u32::try_from(self.members().len()).unwrap_or(u32::MAX);
             sleep(TOGETHER.max(EACH.saturating_mul(parts))).await;
-            self.tell(command);
+            // What ended meanwhile was told with the end.
+            if self.0.is_untold.load(Ordering::SeqCst) {
+                self.tell(command);
+            }
         }
     }
 
@@ -297,6 +315,11 @@ impl Work {
                 tracing::warn!("{}: {}: {UNDONE}", part.drive.as_deref().unwrap_or_default(), part.command);
             }
         }
+        self.note_change();
+    }
+
+    fn note_change(&self) {
+        self.0.is_untold.store(true, Ordering::SeqCst);
         self.0.changed.notify_one();
     }
 
@@ -397,7 +420,7 @@ impl Work {
             }
         }
         drop(parts);
-        self.0.changed.notify_one();
+        self.note_change();
     }
 }
 

@@ -14,7 +14,7 @@ pub enum OutcomeWord {
     Pending,
     /// The drive's own words show it.
     Confirmed,
-    /// It was sent, and the drive's words do not show it.
+    /// It was sent, and the drive's words do not show it. Of a stop that may be settled later, under the same id.
     NotConfirmed,
     /// It was sent, or may have been, and the drive could not be asked. It may be settled later, under the same id.
     Unknown,

@@ -7,7 +7,11 @@ use drive_fleet::{DriveSettings, Until};
 use drive_sim::SimSlave;
 
 use super::*;
-use crate::plant::{commands::LIFETIME, testing::TestPlant};
+use crate::plant::{
+    commands::LIFETIME,
+    revisions::{Next, Subject, data_of},
+    testing::TestPlant,
+};
 use drived_config::rights::Rights;
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -105,4 +109,21 @@ async fn a_run_command_that_comes_behind_a_stop_is_told_and_stands_in_its_outcom
     }
     let again = stop(&test.plant, Target::All).await;
     assert_eq!(again.several.as_ref().unwrap().drives[0].restarts, None, "it is of that stop alone");
+}
+
+/// It is open, and its end is told under the same id: until then nothing of it is new.
+#[tokio::test(start_paused = true)]
+async fn the_outcome_of_a_stop_that_is_not_confirmed_is_told_once() {
+    let test = TestPlant::of(1).await;
+    let mut reader = test.plant.revisions().reader(None);
+    test.machines[0].mute();
+    let told = stop(&test.plant, Target::Drive("pump 1".to_owned())).await;
+    assert!(told.open && told.outcome != OutcomeWord::Pending, "{told:?}");
+    let (mut outcomes, until) = (Vec::new(), Instant::now() + SECOND);
+    while let Ok(Next::Frames(frames)) = timeout_at(until, test.plant.revisions().next(&mut reader)).await {
+        let commands = frames.iter().filter_map(|frame| data_of(frame, Subject::Command));
+        outcomes
+            .extend(commands.map(|(_, data)| serde_json::from_slice::<CommandView>(data).unwrap().outcome));
+    }
+    assert_eq!(outcomes, [OutcomeWord::Pending, told.outcome]);
 }
