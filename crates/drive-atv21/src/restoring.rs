@@ -16,6 +16,7 @@ pub(crate) const RESTORING: Restoring = Restoring {
         Step { registers: &[TIME_OUT_REACTION], why: "F803 acts at once, and by this (§6.4)" },
     ],
     last: &[
+        Step { registers: &[SECOND_REFERENCE], why: COMMAND },
         Step { registers: &[REFERENCE_MODE], why: COMMAND },
         Step { registers: &[COMMAND_MODE], why: COMMAND },
     ],
@@ -38,5 +39,5 @@ pub(crate) const RESTORING: Restoring = Restoring {
     left: &[],
     relations: &[],
     limits: &[],
-    control: &[REFERENCE_MODE, COMMAND_MODE],
+    control: &[SECOND_REFERENCE, REFERENCE_MODE, COMMAND_MODE],
 };

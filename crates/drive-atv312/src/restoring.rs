@@ -37,6 +37,8 @@ const fn from_level(
 const PLATE: &str = "a rating of the motor takes back an auto-tuning: after the settings (BBV51701 p. 30)";
 const COMMAND: &str =
     "who commands goes last: a run input that is closed may start the motor (BBV51701 p. 36, 37)";
+const LOCAL: &str =
+    "an input that is closed takes command in forced local mode: after the settings (BBV51701 p. 55)";
 
 /// An output of `IOLR`.
 const fn free_output(bit: u16, function: u16) -> Limit {
@@ -70,11 +72,6 @@ pub(crate) const RESTORING: Restoring = Restoring {
         Step { registers: &[TA3, TA4], why: "tA3 + tA4 at most 100 (BBV51701 p. 38)" },
         Step { registers: &[CRL3, CRH3], why: "LFL depends on them (BBV51701 p. 54)" },
         Step { registers: &[ETF, LET], why: "EtF by a control bit needs LEt = HIG (BBV51701 p. 52)" },
-        Step {
-            registers: &[DSP, USP, FR2, FR1, PIF, SA3, SA2, PS16, PS8, PS4, PS2],
-            why: "of functions that exclude each other the first blocks the other; PS4 needs PS2 (BBV51701 p. 14, 43, 45)",
-        },
-        Step { registers: &[PR4, PR2], why: "Pr4 needs Pr2 (BBV51701 p. 46)" },
         Step { registers: &[BLC], why: "it forces FLr, brA and OPL (BBV51701 p. 47)" },
     ],
     last: &[
@@ -83,6 +80,17 @@ pub(crate) const RESTORING: Restoring = Restoring {
         Step { registers: &[NSP], why: PLATE },
         Step { registers: &[COS], why: PLATE },
         Step { registers: &[UNS2, FRS2], why: "UnS2/FrS2 is limited (BBV51701 p. 49)" },
+        // With CHCF = SIM who gives the reference commands, and +/- speed needs Fr1 or Fr2.
+        Step {
+            registers: &[DSP, USP, FR2, FR1, PIF, SA3, SA2, PS16, PS8, PS4, PS2],
+            why: "who gives the reference goes behind the limits, with CHCF = SIM it commands; of functions that exclude each other the first \
+                 blocks the other; PS4 needs PS2 (BBV51701 p. 14, 35, 36, 43, 45)",
+        },
+        Step { registers: &[PR4, PR2], why: "Pr4 needs Pr2 (BBV51701 p. 46)" },
+        Step { registers: &[RFC], why: COMMAND },
+        Step { registers: &[LCC_KEYS], why: COMMAND },
+        Step { registers: &[FLOC], why: LOCAL },
+        Step { registers: &[FLO], why: LOCAL },
         Step { registers: &[CHCF], why: COMMAND },
         Step { registers: &[CD2], why: COMMAND },
         Step { registers: &[CD1], why: COMMAND },
@@ -222,7 +230,8 @@ pub(crate) const RESTORING: Restoring = Restoring {
             why: "a write only while dO is not assigned (BBV51701 p. 20)",
         },
     ],
-    control: &[CHCF, CD2, CD1, CCS, COP],
+    // Whoever gives the reference commands with CHCF = SIM (p. 36); a summing input and PI have the motor follow another one (p. 42, 45).
+    control: &[FR1, FR2, RFC, SA2, SA3, PIF, LCC_KEYS, FLO, FLOC, CHCF, CD2, CD1, CCS, COP],
 };
 
 /// Bit 9 of `CMI`.

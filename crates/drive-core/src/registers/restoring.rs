@@ -52,8 +52,8 @@ pub struct Restoring {
     pub relations: &'static [Relation],
     /// Which values registers take by what others hold, judged whenever one of them is written.
     pub limits: &'static [Limit],
-    /// Registers that say who commands: written last, and not at all behind a setting that was refused, for that one may be what
-    /// keeps the motor of whoever commands then within its limits.
+    /// Registers that say who commands, or which reference acts: written last, and not at all behind a setting that was refused, for that one may be
+    /// what keeps the motor of whoever commands then within its limits. What stands in one [`Step`] with one of them stays as it is with it.
     pub control: &'static [u16],
 }
 

@@ -109,7 +109,11 @@ impl Carrying<'_> {
         }
         self.read_related(&pending).await?;
         while let Some(change) = self.way.take(&mut pending) {
-            self.write(change).await?;
+            // One before it in this step may have been refused.
+            match self.goes_on_behind_a_refusal(change.row) {
+                true => self.write(change).await?,
+                false => self.carried.held_back.push(change.row),
+            }
         }
         for change in pending {
             let why = self.way.would_break(&change).unwrap_or_default();
@@ -119,7 +123,7 @@ impl Carrying<'_> {
     }
 
     /// Whether a register is written whatever was refused before it, or is missing: who then takes command has a drive that is not
-    /// set up as the file says. Who commands, and where the drive is found, stays as it is.
+    /// set up as the file says. Who commands, by which reference, and where the drive is found, stays as it is.
     fn goes_on_behind_a_refusal(&self, row: &Row) -> bool {
         let restoring = self.way.restoring();
         let is_line = restoring.part(row) == Part::Communication;

@@ -299,7 +299,7 @@ async fn restore(
 const NOT_SAVED: &str =
     "nothing was saved to EEPROM: see what is missing, then drived param save keeps what was written";
 
-const HELD_BACK: &str = "who commands, and where the drive is found, is only changed when everything else is as in the file; set \
+const HELD_BACK: &str = "who commands, by which reference, and where the drive is found, is only changed when everything else is as in the file; set \
     what was refused or is missing, or take its line out of the file, and run it again";
 
 fn refusal_json(slave: u8, (row, why): &(&'static drive_core::Row, String)) -> Value {

@@ -116,6 +116,9 @@ fn orders(family: Family) -> &'static [(&'static str, &'static str, &'static str
             ("Inr", "dEC", "p. 38"),
             ("UFt", "UFr", "p. 27: UFt puts UFr back"),
             ("tFr", "Fr1", "limits before what uses them"),
+            ("dEC", "Fr1", "p. 36: with CHCF = SIM it is who commands"),
+            ("FrS", "Fr1", "p. 36: behind everything else"),
+            ("nSP", "PIF", "what the motor follows behind everything else"),
             ("SA2", "PIF", "p. 45: PI is blocked by a summing input"),
             ("ACC", "UnS", "the ratings of the motor last"),
             ("SLL", "UnS", "the ratings of the motor last"),
@@ -293,8 +296,8 @@ async fn a_backup_of_one_drive_goes_into_another_but_for_what_that_one_cannot_ha
     let Some((Failure::Drive(why), true)) = &told.failure else { panic!("{:?}", told.failure) };
     assert!(why.contains("1 parameter was refused: LAC") && why.contains("Cd1"), "{why}");
     assert!(why.contains("2 parameters were not restored: UnS, nCr"), "{why}");
-    // Everything else is as in the file; who commands is not, and nothing is in the EEPROM.
-    assert_eq!(other.differences(&file).await, ["UnS", "nCr", "LAC", "Cd1"]);
+    // Everything else is as in the file; who commands and what the motor follows is not, and nothing is in the EEPROM.
+    assert_eq!(other.differences(&file).await, ["UnS", "nCr", "LAC", "Cd1", "SA2", "PIF"]);
     assert_eq!((other.machine.peek(8_423), &told.json["saved"]), (command, &json!(false)));
     assert!(other.machine.peek(9_001) == Some(1_234) && other.machine.peek(9_604) == Some(1_745));
 }
@@ -665,4 +668,60 @@ async fn who_commands_stays_as_it_is_where_a_setting_of_the_file_could_not_be_re
     assert!(told.failure.is_none(), "{:?}", told.failure);
     assert!(told.text.iter().any(|text| text.starts_with("not written: Add")), "{:?}", told.text);
     assert_eq!(new.machine.peek(8_423), Some(1));
+}
+
+/// A file of these settings, for a drive that holds these registers else and refuses one of them: what is held back then.
+struct Case {
+    file: &'static [(&'static str, u16)],
+    holds: &'static [(u16, u16)],
+    refused: &'static str,
+    held_back: &'static [&'static str],
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_gives_the_reference_which_is_who_commands_with_chcf_sim_stays_as_it_is_behind_a_refusal() {
+    let said = |words: &'static [(&'static str, u16)]| async move {
+        let mut file = Bench::of(Family::ATV312, SetUp::ForTheBus).source.keep().await.unwrap();
+        file.entries.retain(|entry| words.iter().any(|(code, _)| *code == entry.row.code));
+        edited(file, words)
+    };
+    // CHCF = SIM (BBV51701 p. 36), where LAC goes back only by a factory setting (p. 35); an input that takes command in forced local mode
+    // (p. 55); a summing input beside PI, in the step of Fr1 (p. 45).
+    let cases = [
+        Case {
+            file: &[("LAC", 0), ("Fr1", 1), ("rFC", 97)],
+            holds: &[(8_401, 1)],
+            refused: "LAC",
+            held_back: &["Fr1", "rFC"],
+        },
+        Case {
+            file: &[("LAC", 0), ("FLO", 132), ("FLOC", 2)],
+            holds: &[],
+            refused: "LAC",
+            held_back: &["FLOC", "FLO"],
+        },
+        Case {
+            file: &[("SA2", 2), ("Fr1", 164)],
+            holds: &[(8_413, 1), (11_801, 0), (11_401, 0), (11_402, 0), (11_901, 1)],
+            refused: "SA2",
+            held_back: &["Fr1"],
+        },
+    ];
+    for Case { file: words, holds, refused, held_back } in cases {
+        let file = said(words).await;
+        let mut drive = Bench::of(Family::ATV312, SetUp::ForTheBus);
+        for (register, word) in holds {
+            assert!(drive.machine.poke(*register, *word), "{register}");
+        }
+        let plan = drive.plan(&file).await;
+        let carried = drive.carry(&plan).await;
+        let codes = |rows: &[&'static drive_core::Row]| rows.iter().map(|row| row.code).collect::<Vec<_>>();
+        let refusals: Vec<_> = carried.refused.iter().map(|(row, _)| *row).collect();
+        assert_eq!(
+            (codes(&refusals), codes(&carried.held_back)),
+            (vec![refused], held_back.to_vec()),
+            "{words:?}"
+        );
+        assert_eq!(carried.written, [], "{words:?}");
+    }
 }
