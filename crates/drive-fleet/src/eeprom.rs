@@ -52,7 +52,7 @@ drive_core::named! { EepromUse {
 /// assert_eq!(ledger.to_string(), "24 writes today, 24 in all");
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct EepromLedger {
     /// Writes, or what may have been one, in all.
@@ -69,7 +69,7 @@ pub struct EepromLedger {
 
 /// A watchdog that was set up in vain.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct InVain {
     /// Which drive it was, as it says; `None` where it does not.

@@ -311,7 +311,7 @@ pub struct Alarms {
 /// stands. Else somebody else has started the motor. Where a [`stop`](Self::stop) was given and not confirmed, whoever has started the
 /// motor, the same drive is stopped by it as soon as it has said that it is the same.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct RunRecord {
     /// Which drive it was, as [`Identity`] is displayed; `None` where it does not say.

@@ -23,7 +23,7 @@ pub struct WatchdogContract {
 ///
 /// It is put back only where the drive says that it is the same one and still has the watchdog that was set.
 #[derive(Debug, Clone, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct WatchdogBefore {
     /// Which drive it was, as [`Identity`](drive_core::Identity) is displayed.

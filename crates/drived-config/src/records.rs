@@ -3,19 +3,23 @@
 
 use std::{
     collections::BTreeMap,
-    io,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
+use drive_core::StopMode;
 use drive_fleet::{EepromLedger, Event, EventKind, Events, Place, Received, RunRecord, WatchdogBefore};
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde::{Serialize, de::DeserializeOwned};
+use serde_json::{Map, Value};
 use tokio::task::{JoinHandle, spawn_blocking};
 
+use self::read::Read;
 use crate::{
     kept::{Kept, Stale},
     places::Places,
 };
+
+mod read;
 
 /// What is kept of a drive.
 pub trait Record: Serialize + DeserializeOwned + Clone + PartialEq {
@@ -27,6 +31,16 @@ pub trait Record: Serialize + DeserializeOwned + Clone + PartialEq {
     /// Whether a stop is in it that was not confirmed.
     fn stops(&self) -> bool {
         false
+    }
+
+    /// Whether a stop may be in it by what of it is not known here.
+    fn may_hide_a_stop(&self) -> bool {
+        false
+    }
+
+    /// What is taken from one that cannot be read.
+    fn rescued(_record: &Value) -> Option<Self> {
+        None
     }
 
     /// Whether it stays at its place as well where it goes by the name to another one: that may be another machine.
@@ -43,6 +57,25 @@ impl Record for RunRecord {
 
     fn stops(&self) -> bool {
         self.stop.is_some()
+    }
+
+    /// One that has its stop is given it.
+    fn may_hide_a_stop(&self) -> bool {
+        self.stop.is_none()
+    }
+
+    /// A stop that was given is given anew, by the ramp where its way is not known here, with as much as can be read: one stop too many is better
+    /// than one too few.
+    fn rescued(record: &Value) -> Option<Self> {
+        let said = record.get("stop").filter(|said| !said.is_null())?;
+        let is_known = serde_json::from_value::<StopMode>(said.clone()).is_ok();
+        let stop = if is_known { said.clone() } else { serde_json::to_value(StopMode::Ramp).ok()? };
+        let with = |keys: &[&str]| {
+            let keys = keys.iter().filter_map(|key| Some(((*key).to_owned(), record.get(key)?.clone())));
+            let all = keys.chain([("stop".to_owned(), stop.clone())]).collect::<Map<_, _>>();
+            serde_json::from_value(Value::Object(all)).ok()
+        };
+        with(&["identity", "lease"]).or_else(|| with(&["identity"]))
     }
 
     /// A stop is given where its name is, and told. A run is adopted there, or it stands where it was and nobody watches it.
@@ -87,6 +120,8 @@ struct Inner<T> {
     drives: BTreeMap<Place, Entry<T>>,
     /// Writing has failed, which is told once.
     failing: bool,
+    /// What could not be read, in words, and to which nobody has seen.
+    lost: Option<String>,
 }
 
 #[derive(Debug)]
@@ -99,8 +134,8 @@ struct Entry<T> {
 }
 
 /// As it stands in the file.
-#[derive(Serialize, Deserialize)]
-#[serde(untagged, deny_unknown_fields)]
+#[derive(Serialize)]
+#[serde(untagged)]
 enum Written<T> {
     /// By the place.
     At { drive: String, record: T },
@@ -109,22 +144,30 @@ enum Written<T> {
 }
 
 impl<T: Record> Records<T> {
-    /// Reads the file, and gives what stands in it to whom it belongs. What belongs to nobody is told, and kept. A file that cannot be read
-    /// keeps no motor from being watched: it is told what is missing then.
+    /// Reads the file, and gives what stands in it to whom it belongs. What belongs to nobody is told, and kept. What cannot be read keeps
+    /// no motor from being watched, and no other record from being read: it is told what is missing then, and the file is put aside.
     pub fn open(file: Option<&Path>, places: &Places) -> Self {
         let file = file.map(Kept::at);
         let told = file.as_ref().map_or(Path::new(""), Kept::path).display().to_string();
-        let read = file.as_ref().map_or_else(|| Ok(BTreeMap::new()), read::<T>);
-        let read = read.unwrap_or_else(|error| {
-            tracing::error!("{told}: {error}: {}", T::LOSS);
-            BTreeMap::new()
-        });
-        let (mut drives, mut others, mut is_other) = (BTreeMap::new(), Vec::new(), false);
-        for (key, written) in read {
-            let (name, place, record) = match written {
-                Written::At { drive, record } => (drive, Some(Place::from(&*key)), record),
-                Written::Of(record) => (key, None, record),
-            };
+        let Read { records, lost, doubts } = file.as_ref().map_or_else(Read::default, Read::<T>::of);
+        for doubt in doubts {
+            tracing::warn!("{told}: {doubt}");
+        }
+        // What stands there is not overwritten before it stands elsewhere.
+        let (mut is_other, lost) = match &file {
+            Some(file) if !lost.is_empty() => {
+                let aside = read::put_aside(file).inspect_err(|error| {
+                    tracing::error!("{told}: it cannot be put aside: {error}");
+                });
+                let lost = read::told(&lost, aside.as_ref().ok());
+                tracing::error!("{told}: {lost}. Of what could not be read: {}", T::LOSS);
+                (aside.is_ok(), Some(lost))
+            }
+            Some(file) => (false, read::lost_before::<T>(file)),
+            None => (false, None),
+        };
+        let (mut drives, mut others) = (BTreeMap::new(), Vec::new());
+        for (name, place, record) in records {
             match place.as_ref().and_then(|place| Some((place, places.name_at(place)?))) {
                 Some((place, now)) => {
                     is_other |= now != name;
@@ -165,7 +208,7 @@ impl<T: Record> Records<T> {
             };
             drives.insert(key, Entry { name, record, is_alone: true });
         }
-        let records = Self(Arc::new(Mutex::new(Inner { file, drives, failing: false })));
+        let records = Self(Arc::new(Mutex::new(Inner { file, drives, failing: false, lost })));
         if is_other {
             // What is there says the same, in other words.
             records.write_or(Stale::Left);
@@ -231,6 +274,22 @@ impl<T: Record> Records<T> {
         self.take_out(|other, _| other == place)
     }
 
+    /// What could not be read, by this run or an earlier one, in words, until somebody has seen to it.
+    pub fn lost(&self) -> Option<String> {
+        self.lock().lost.clone()
+    }
+
+    /// Somebody has seen to what could not be read.
+    pub fn see_to_lost(&self) {
+        let file = {
+            let mut inner = self.lock();
+            inner.lost.take().and(inner.file.clone())
+        };
+        if let Some((file, Err(error))) = file.map(|file| (file.clone(), read::see_to(&file))) {
+            tracing::error!("{}: {error}: it is told anew by the next run", file.path().display());
+        }
+    }
+
     /// Takes out what is nobody's, of these.
     fn take_out(&self, is_meant: impl Fn(&Place, &Entry<T>) -> bool) -> bool {
         let drives = &mut self.lock().drives;
@@ -290,13 +349,6 @@ fn tell(record: &impl Record, text: &str) {
         tracing::error!("{text}");
     } else {
         tracing::warn!("{text}");
-    }
-}
-
-fn read<T: Record>(file: &Kept) -> io::Result<BTreeMap<String, Written<T>>> {
-    match file.read_secured()? {
-        Some(text) => Ok(serde_json::from_slice(&text)?),
-        None => Ok(BTreeMap::new()),
     }
 }
 

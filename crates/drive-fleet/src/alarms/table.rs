@@ -25,6 +25,8 @@ pub enum AlarmKind {
     StopLeft,
     /// A run command is kept of a drive that is not in the configuration: nobody watches what it turns.
     RunLeft,
+    /// What was kept of runs and stops could not be read: a stop may not be given anew, and a motor not be watched.
+    RecordsLost,
     /// The audit log cannot be written, so that only stops are carried out.
     AuditLog,
     /// The history cannot be written: what happens now waits in memory, and what finds no room there is lost.
@@ -36,12 +38,13 @@ pub enum AlarmKind {
 }
 
 /// Those that are of no drive's own.
-const OTHERS: [AlarmKind; 9] = [
+const OTHERS: [AlarmKind; 10] = [
     AlarmKind::LineAway,
     AlarmKind::LineSilent,
     AlarmKind::LineFinding,
     AlarmKind::StopLeft,
     AlarmKind::RunLeft,
+    AlarmKind::RecordsLost,
     AlarmKind::AuditLog,
     AlarmKind::History,
     AlarmKind::Maintenance,
@@ -100,6 +103,12 @@ impl AlarmKind {
                 "a run command of this program may stand in a drive that is not in the configuration, and nobody watches it: the motor may turn",
                 Severity::Alarm,
                 "see whether the motor turns; once its drive is in the configuration again, it is watched and can be stopped from here; where it is not to be there again: drived alarms done NUMBER",
+            ),
+            Self::RecordsLost => row(
+                "records_lost",
+                "not all that was kept of runs and stops could be read, a stop or a run may be lost: a motor may turn",
+                Severity::Alarm,
+                "see whether a motor turns that should not, and stop it; then: drived alarms done NUMBER",
             ),
             Self::AuditLog => row(
                 "audit_log",
@@ -173,7 +182,7 @@ impl AlarmKind {
     pub const fn is_of_motion(self) -> bool {
         match self {
             Self::Drive(kind) => kind.wakes(),
-            Self::StopLeft | Self::RunLeft => true,
+            Self::StopLeft | Self::RunLeft | Self::RecordsLost => true,
             _ => false,
         }
     }

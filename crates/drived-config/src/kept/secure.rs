@@ -114,6 +114,17 @@ impl Kept {
         }
     }
 
+    /// Has another file have what stands in it.
+    ///
+    /// # Errors
+    /// It is not there or cannot be read, or the other one cannot be written.
+    pub fn copy_to(&self, other: &Self) -> io::Result<()> {
+        match self.read_up_to(LONGEST_SECURED)? {
+            Some((content, _)) => other.replace(&content, Readers::Owner),
+            None => Err(io::ErrorKind::NotFound.into()),
+        }
+    }
+
     /// Writes it in its place, where there is one: whoever is cut off leaves nothing, or half of it, which is told from the whole.
     fn overwrite(&self, content: &[u8]) -> io::Result<()> {
         use io::Write as _;

@@ -48,6 +48,79 @@ fn what_was_kept_is_known_after_a_kill_and_half_a_file_says_nothing() {
     assert_eq!(open().of(&ONE.into()), None);
 }
 
+/// A run of the first drive and a stop of the second, as they are written, with this put in the place of that.
+fn written(that: &str, this: &str) -> String {
+    let folder = Folder::new("records-written");
+    let file = folder.file("runs.json");
+    let records = Records::<RunRecord>::open(Some(&file), &places(&[("north", ONE), ("south", TWO)]));
+    records.set(&ONE.into(), "north", Some(record(None)));
+    records.set(&TWO.into(), "south", Some(record(Some(StopMode::Fast))));
+    records.write();
+    let text = fs::read_to_string(file).unwrap();
+    assert!(text.contains(that), "{text}");
+    text.replacen(that, this, 1)
+}
+
+#[test]
+fn a_record_that_cannot_be_read_loses_no_other_ones_stop_and_is_put_aside_and_told_until_somebody_has_seen_to_it()
+ {
+    let stop = record(Some(StopMode::Fast));
+    let whole = written("{", "{");
+    let cases = [
+        written("\"word\": 15", "\"word\": \"?\""),
+        written("\"lease\": {", "\"lease\": 7, \"run\": {"),
+        format!("{whole}{whole}"),
+        // Cut off behind the second, or in the first that follows it.
+        whole.trim_end().trim_end_matches('}').to_owned() + "}},",
+        whole.trim_end().trim_end_matches('}').to_owned() + "}}, \"/dev/ttyUSB0 atv312@3\": {\"dri",
+    ];
+    for text in cases {
+        let folder = Folder::new("records-one-lost");
+        let file = folder.file("runs.json");
+        let open = || Records::<RunRecord>::open(Some(&file), &places(&[("north", ONE), ("south", TWO)]));
+        fs::write(&file, &text).unwrap();
+        for _ in 0..2 {
+            let records = open();
+            assert_eq!(records.of(&TWO.into()), Some(stop.clone()), "{text}");
+            let lost = records.lost().expect("it is told");
+            assert!(lost.contains("runs.json.damaged"), "{lost}");
+            assert_eq!(fs::read_to_string(folder.file("runs.json.damaged")).unwrap(), text);
+        }
+        open().see_to_lost();
+        assert_eq!((open().lost(), open().of(&TWO.into())), (None, Some(stop.clone())));
+        assert_eq!(fs::read_to_string(folder.file("runs.json.damaged.seen")).unwrap(), text);
+    }
+    let empty = ["", "\0\0\0\0", "[]"];
+    for text in empty {
+        let folder = Folder::new("records-all-lost");
+        let file = folder.file("runs.json");
+        fs::write(&file, text).unwrap();
+        let open = || Records::<RunRecord>::open(Some(&file), &places(&[("north", ONE)]));
+        assert!(open().lost().is_some() && open().lost().is_some(), "{text:?}");
+    }
+}
+
+#[test]
+fn a_stop_is_kept_whose_record_a_newer_version_has_written() {
+    // What it was, what stands there now, how it stops then, and whether something may be lost.
+    let cases = [
+        ("\"stop\": \"fast\"", "\"stop\": \"fast\", \"since\": 1", StopMode::Fast, false),
+        ("\"stop\": \"fast\"", "\"stop\": \"coast\"", StopMode::Ramp, false),
+        ("\"stop\": \"fast\"", "\"stop\": {\"mode\": \"fast\"}, \"injection_ms\": []", StopMode::Ramp, false),
+        ("\"word\": 15", "\"word\": 15, \"since\": 1", StopMode::Fast, true),
+        ("\"record\": {", "\"version\": 2, \"record\": {", StopMode::Fast, false),
+    ];
+    for (that, this, mode, may_be_lost) in cases {
+        let folder = Folder::new("records-newer");
+        let file = folder.file("runs.json");
+        fs::write(&file, written(that, this)).unwrap();
+        let records = Records::<RunRecord>::open(Some(&file), &places(&[("north", ONE), ("south", TWO)]));
+        assert_eq!(records.of(&TWO.into()), Some(record(Some(mode))), "{this}");
+        assert_eq!(records.of(&ONE.into()), Some(record(None)), "{this}");
+        assert_eq!(records.lost().is_some(), may_be_lost, "{this}: {:?}", records.lost());
+    }
+}
+
 #[test]
 fn a_record_goes_with_the_machine_when_two_names_are_exchanged_in_the_file_behind_a_kill() {
     let folder = Folder::new("records-exchanged");

@@ -33,7 +33,6 @@ pub struct QuickStops {
 
 /// A drive that is locked.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 struct Locked {}
 
 impl Record for Locked {

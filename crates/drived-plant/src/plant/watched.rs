@@ -54,7 +54,6 @@ pub struct WatchedDoor<'a> {
 
 /// Who has started a motor, and what becomes of it when he is silent.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 struct Starter {
     door: String,
     listen: SocketAddr,

@@ -56,6 +56,7 @@ export const SENTENCES_FR = {
   'drived doctor says more': 'drived doctor en dit davantage',
   'see whether the motor turns; once its drive is in the configuration again, it is watched and can be stopped from here; where it is not to be there again: drived alarms done NUMBER': 'voir si le moteur tourne ; dès que son variateur est de nouveau dans la configuration, il est surveillé et peut être arrêté d’ici ; s’il ne doit plus y être : drived alarms done NUMÉRO',
   'see whether the motor turns; once its drive is in the configuration again, the stop is given anew': 'voir si le moteur tourne ; dès que son variateur est de nouveau dans la configuration, l’arrêt est redonné',
+  'see whether a motor turns that should not, and stop it; then: drived alarms done NUMBER': 'voir si un moteur tourne qui ne le devrait pas, et l’arrêter ; ensuite : drived alarms done NUMÉRO',
   'see whether its disk is full; the log of the program says why': 'voir si son disque est plein ; le journal du programme dit pourquoi',
   'see what is said of it, mend the file, and read it again': 'voir ce qui en est dit, corriger le fichier et le relire',
   'look at its supply, its address and its cable': 'vérifier son alimentation, son adresse et son câble',

@@ -95,6 +95,7 @@ const TABLE = {
   alarm_line_finding: ['the line is not as it should be', 'la ligne n’est pas comme elle devrait être'],
   alarm_stop_left: ['a stop was not confirmed, and nobody gives it, for its drive is not in the configuration: the motor may turn', 'un arrêt n’a pas été confirmé et personne ne le donne, car son variateur n’est pas dans la configuration : le moteur peut tourner'],
   alarm_run_left: ['a run command of this program may stand in a drive that is not in the configuration, and nobody watches it: the motor may turn', 'un ordre de marche de ce programme peut être donné à un variateur qui n’est pas dans la configuration, et personne ne le surveille : le moteur peut tourner'],
+  alarm_records_lost: ['not all that was kept of runs and stops could be read, a stop or a run may be lost: a motor may turn', 'tout ce qui était conservé des marches et des arrêts n’a pas pu être lu, un arrêt ou une marche peut être perdu : un moteur peut tourner'],
   alarm_audit_log: ['the audit log cannot be written, only stops are carried out', 'le journal d’audit ne peut être écrit, seuls les arrêts sont exécutés'],
   alarm_history: ['the history cannot be written, what happens now waits in memory and may be lost', 'l’historique ne peut être écrit, ce qui se passe maintenant attend en mémoire et peut être perdu'],
   alarm_maintenance: ['maintenance is due', 'un entretien est à faire'],

@@ -47,7 +47,7 @@ impl Inner {
             return;
         }
         let (now, mut names) = (now(), BTreeSet::new());
-        let mut looks = vec![Look::at_program(&self.alarms.wrong(), &self.alarms.left())];
+        let mut looks = vec![Look::at_program(&self.alarms.wrong_with_program(), &self.alarms.left())];
         for (name, line) in self.fleet.lines() {
             let drives = self.fleet.drives_on(&name);
             let snapshots: Vec<Arc<Snapshot>> = drives.iter().map(DriveHandle::snapshot).collect();

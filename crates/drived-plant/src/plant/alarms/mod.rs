@@ -125,6 +125,20 @@ impl Desk {
         self.runs.as_ref().map(Records::left).unwrap_or_default()
     }
 
+    /// What is wrong with the program itself, and what was lost of the runs and stops that were kept.
+    fn wrong_with_program(&self) -> BTreeMap<AlarmKind, String> {
+        let lost = self.runs.as_ref().and_then(Records::lost);
+        let lost = lost.map(|lost| (AlarmKind::RecordsLost, lost));
+        self.wrong().clone().into_iter().chain(lost).collect()
+    }
+
+    /// Somebody has seen to what was lost.
+    fn see_to_lost(&self) {
+        if let Some(runs) = self.runs.clone() {
+            spawn_blocking(move || runs.see_to_lost());
+        }
+    }
+
     /// Somebody has seen to what is left at a place.
     fn forget_left(&self, place: &Place) {
         if let Some(runs) = self.runs.clone().filter(|runs| runs.forget(place)) {
@@ -172,6 +186,11 @@ impl Plant {
                 let place = alarm.mark.as_deref().map(Place::from);
                 let changes = alarms.acknowledge(id, &caller.name, note.as_deref(), now)?;
                 place.iter().for_each(|place| self.0.alarms.forget_left(place));
+                changes
+            }
+            AlarmAct::Done { note } if alarm.kind == AlarmKind::RecordsLost => {
+                let changes = alarms.acknowledge(id, &caller.name, note.as_deref(), now)?;
+                self.0.alarms.see_to_lost();
                 changes
             }
             AlarmAct::Done { note } => {

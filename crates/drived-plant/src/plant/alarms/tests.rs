@@ -235,3 +235,24 @@ async fn a_stop_that_is_nobodys_is_an_alarm_through_restarts_until_its_drive_is_
     sleep(Duration::from_secs(3)).await;
     assert_eq!(plant.alarms().alarms, []);
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_run_or_a_stop_that_may_be_lost_is_an_alarm_through_restarts_until_somebody_has_seen_to_it() {
+    let folder = Folder::new("alarms-records-lost");
+    let file = folder.file("runs.json");
+    fs::write(&file, "{ \"/dev/ttyUSB0 atv312@7\": { \"drive\": \"mixer\", \"rec").unwrap();
+    let runs = || Records::<RunRecord>::open(Some(&file), &Places::default());
+    let kept = || KeptAlarms::default().with_runs_of(runs());
+    drop(TestPlant::keeping(1, &kept()).await);
+    let test = TestPlant::keeping(1, &kept()).await;
+    sleep(Duration::from_secs(3)).await;
+    let alarm = one(&test.plant);
+    assert_eq!((alarm.alarm.kind, alarm.state), (AlarmKind::RecordsLost, AlarmState::Unacknowledged));
+    assert!(alarm.alarm.kind.wakes(), "somebody is called for it");
+    assert!(alarm.text.contains("a motor may turn") && alarm.text.contains("atv312@7"), "{alarm:?}");
+    let seen_to = AlarmAct::Done { note: Some("all stand, I saw it".to_owned()) };
+    test.plant.act_on_alarm(&operator(), alarm.alarm.id, &seen_to).unwrap();
+    sleep(Duration::from_secs(3)).await;
+    assert_eq!(test.plant.alarms().alarms, []);
+    assert_eq!(runs().lost(), None);
+}
