@@ -108,7 +108,13 @@ impl Alarms {
             because => *because == alarm.because,
         };
         let stands = !is_new && is_as_told;
-        let is_explained = !stands && alarm.detail != detail || alarm.remedy != remedy;
+        // It came while the clock was ahead, and that was set right: it has stood since, and not from a time to come on.
+        let is_ahead = !is_new && alarm.last_unix_ms > now;
+        if is_ahead {
+            alarm.last_unix_ms = since;
+            alarm.first_unix_ms = alarm.first_unix_ms.min(since);
+        }
+        let is_explained = is_ahead || !stands && alarm.detail != detail || alarm.remedy != remedy;
         alarm.remedy = remedy;
         if !stands {
             (alarm.detail, alarm.because) = (detail, condition.because.clone());

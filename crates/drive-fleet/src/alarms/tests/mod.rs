@@ -352,3 +352,29 @@ fn a_drive_that_is_called_otherwise_keeps_its_alarms_with_their_notes() {
     assert_eq!((alarm.id, alarm.count, alarm.drive.as_deref()), (id, 1, Some("mixer")));
     assert_eq!(alarm.state(), AlarmState::Acknowledged);
 }
+
+#[test]
+fn an_alarm_that_came_while_the_clock_was_ahead_has_stood_since_it_came_when_that_is_set_right() {
+    let mut alarms = Alarms::default();
+    let since = |unix_ms| {
+        let mut look = pump(&[TRIPPED]);
+        look.there[0].since_unix_ms = Some(unix_ms);
+        look
+    };
+    alarms.look(&[since(1_000 * HOUR)], 1_000 * HOUR);
+    // Set right 30 s later, by which the drive has tripped 30 s ago still.
+    let now = 10 * HOUR;
+    let changes = alarms.look(&[since(now - 30 * SECOND)], now);
+    assert_eq!(became(&changes), [Became::Explained], "whoever reads along is told");
+    let alarm = &alarms.all()[0];
+    let came = now - 30 * SECOND;
+    assert_eq!((alarm.first_unix_ms, alarm.last_unix_ms, alarm.count), (came, came, 1));
+    assert_eq!(alarms.look(&[since(came)], now + SECOND), [], "and once");
+    // Of what nobody knows since when it is so it is known from now on.
+    let mut alarms = Alarms::default();
+    alarms.look(&[pump(&[LOST])], 1_000 * HOUR);
+    for later in [0, SECOND, HOUR] {
+        alarms.look(&[pump(&[LOST])], now + later);
+        assert_eq!(alarms.all()[0].last_unix_ms, now);
+    }
+}
