@@ -166,7 +166,7 @@ impl Reading {
         Ok(pieces)
     }
 
-    /// The same in steps.
+    /// The same in steps; `None`: what is kept of its time is in steps alone, which have all its readings in them.
     ///
     /// # Errors
     /// It cannot be read.
@@ -176,10 +176,15 @@ impl Reading {
         drive: &str,
         quantity: Quantity,
         length_ms: i64,
-    ) -> Result<Vec<StepView>, StoreError> {
+    ) -> Result<Option<Vec<StepView>>, StoreError> {
         let mut steps = empty(quantity, length_ms.max(1));
-        self.pieces(connection, drive, quantity)?.into_iter().for_each(|piece| steps.add(piece));
-        Ok(told(&steps, quantity, length_ms.max(1)))
+        let pieces = self.pieces(connection, drive, quantity)?;
+        // What is kept as it was read may all be of another reading, as behind a kill soon after the clock was set.
+        if pieces.is_empty() && told_in(connection, drive, quantity, self.from_ms, self.to_ms)?.is_empty() {
+            return Ok(None);
+        }
+        pieces.into_iter().for_each(|piece| steps.add(piece));
+        Ok(Some(told(&steps, quantity, length_ms.max(1))))
     }
 }
 

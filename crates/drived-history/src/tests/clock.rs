@@ -78,8 +78,30 @@ fn a_time_that_ends_before_it_begins_has_what_was_before_the_clock_was_set_back_
     assert_eq!(once, [(100, 500, events([300]))]);
     assert_eq!(readings(&store, 2 * HOUR_S + 400, HOUR_S + 400), [], "the clock had not come so far");
     let reading = &read::readings(&store.connection, BEGIN_MS + 7_000_000, BEGIN_MS + 3_700_000).unwrap()[0];
-    let steps = reading.steps(&store.connection, "pump", HZ, 60_000).unwrap();
+    let steps =
+        reading.steps(&store.connection, "pump", HZ, 60_000).unwrap().expect("it is kept as it was read");
     assert!(steps.iter().all(|step| step.least >= 700.0 && step.greatest < 720.0), "{steps:?}");
+}
+
+/// As behind a kill within the minute, or where it is asked before what was read since is written.
+#[test]
+fn values_of_before_are_not_told_again_as_those_after_a_clock_was_set_back_of_which_there_are_none_yet() {
+    let folder = Folder::new("history-turned-killed");
+    let mut store = lived(&folder, &[&[(0..HOUR_S, 0)]]);
+    let at = |second: i64, back: i64| Moment {
+        steady_ms: second * 1_000,
+        wall_ms: BEGIN_MS + (HOUR_S + second - back) * 1_000,
+    };
+    let mut archive = Archive::begin(at(0, 0));
+    archive.begin_run(&mut store.connection, "test").unwrap();
+    archive.look_at_clock(at(1, HOUR_S / 2));
+    archive.record(event(at(1, HOUR_S / 2), "pump", "stop"));
+    archive.end_run(&mut store.connection, at(2, HOUR_S / 2)).unwrap();
+    let readings = read::readings(&store.connection, BEGIN_MS, BEGIN_MS + HOUR_S * 1_000).unwrap();
+    let steps = |reading: &Reading| reading.steps(&store.connection, "pump", HZ, 60_000).unwrap();
+    let [before, after] = &readings[..] else { panic!("{readings:?}") };
+    assert_eq!(steps(before).map(|steps| steps.len()), Some(60));
+    assert_eq!(steps(after), Some(Vec::new()), "nothing was read since");
 }
 
 #[test]

@@ -196,10 +196,9 @@ impl Asked<'_> {
         if !self.reading.is_the_only_one() {
             let steps =
                 self.reading.steps(&self.history.0, self.drive, quantity, length_ms).map_err(failed)?;
-            if !steps.is_empty() {
+            if let Some(steps) = steps {
                 return Ok(steps);
             }
-            // What is kept in steps alone has both readings in them.
         }
         read::steps(&self.history.0, self.drive, quantity, self.from, self.to, length_ms, &|| true)
             .map_err(failed)
