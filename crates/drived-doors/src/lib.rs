@@ -72,13 +72,13 @@ use self::{
     host::Hosts,
     sessions::Sessions,
     threads::Own,
-    tls::Tls,
     tokens::{Right, Tokens},
 };
 pub use self::{
     network::Network,
     refusal::lacking,
     secret::{private, secret},
+    tls::{Pair, Tls, certificate_doubt},
     token_desk::{
         MadeToken, NewToken, RemovedToken, Rotation, TOKENS, TokensView, added, of_hours, replaced,
     },
@@ -182,6 +182,11 @@ impl Prepared {
     /// The audit log, which whoever else takes commands writes too.
     pub fn audit(&self) -> Audit {
         self.audit.clone()
+    }
+
+    /// The certificate by which the page is served, which another may take the place of; `None`: it is served in clear, or not at all.
+    pub fn certificate(&self) -> Option<Tls> {
+        self.http.as_ref()?.tls.clone()
     }
 
     /// Opens the doors before a router, of which these addresses stop: what is asked there has a way of its own. An address of the HTTP server that is taken, or not there yet, is tried again and

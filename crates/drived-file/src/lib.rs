@@ -31,7 +31,10 @@ use drived_config::config::{
     NO_DRIVE, Source, State, groups, line_part, look_alikes, of,
 };
 use drived_config::profiles::{Folder, ProfilesError};
-use drived_doors::config::{DoorsConfig, Http};
+use drived_doors::{
+    certificate_doubt,
+    config::{DoorsConfig, Http},
+};
 use drived_face::{Configured, Site, Written};
 use drived_words::failure::Failure;
 
@@ -197,7 +200,8 @@ impl Config {
     /// What is left out of the folder of profiles, and names that somebody may take for others.
     pub fn doubts(&self) -> Vec<String> {
         let left_out = self.left_out.iter().map(|why| format!("a profile is left out: {why}"));
-        left_out.chain(self.doubtful_names()).collect()
+        let tls = self.doors.http.as_ref().and_then(|http| http.tls.as_ref());
+        left_out.chain(self.doubtful_names()).chain(tls.and_then(certificate_doubt)).collect()
     }
 
     /// Names that somebody may take for others.

@@ -17,7 +17,7 @@ use support::{File, Running, Sim, free_port, is_there, path, python_with};
 struct Daemon {
     running: Option<Running>,
     _sim: Sim,
-    _file: File,
+    file: File,
     folder: PathBuf,
     port: u16,
 }
@@ -45,7 +45,7 @@ impl Daemon {
         for _ in 0..2 {
             running.wait_for(r#""event":"identified""#);
         }
-        Self { running: Some(running), _sim: sim, _file: config, folder, port }
+        Self { running: Some(running), _sim: sim, file: config, folder, port }
     }
 
     fn certificate(&self) -> String {
@@ -148,6 +148,41 @@ fn openssl_agrees_on_tls_1_3_verifies_the_certificate_and_is_refused_with_tls_1_
     // Its own lowest level would refuse to ask for it.
     let (is_done, answer) = client(&["-tls1_1", "-cipher", "ALL:@SECLEVEL=0"]);
     assert!(!is_done && answer.contains("alert"), "{answer}");
+    daemon.end();
+}
+
+#[test]
+fn a_renewed_certificate_is_served_after_a_reload_and_one_whose_key_does_not_fit_is_refused() {
+    if !is_there("openssl", &["version"]) {
+        return;
+    }
+    let mut daemon = Daemon::start("tls-renewed");
+    let served = |daemon: &Daemon| {
+        let connect = format!("localhost:{}", daemon.port);
+        said(Command::new("openssl").args(["s_client", "-connect", &connect])).1
+    };
+    let (certificate, key) = (daemon.folder.join("certificate.pem"), daemon.folder.join("key.pem"));
+    let made = |certificate: &PathBuf, key: &PathBuf| {
+        let mut make = Command::new("openssl");
+        make.args(["req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "9", "-subj", "/CN=renewed"]);
+        let (is_done, answer) = said(make.arg("-keyout").arg(key).arg("-out").arg(certificate));
+        assert!(is_done, "{answer}");
+        fs::set_permissions(key, fs::Permissions::from_mode(0o600)).expect("it is ours");
+    };
+    let reload = |daemon: &mut Daemon, log: &str| {
+        let running = daemon.running.as_mut().expect("it runs");
+        running.signal("-HUP");
+        running.wait_for_log(log);
+    };
+    // The certificate is there before its key.
+    made(&certificate, &daemon.folder.join("other.pem"));
+    reload(&mut daemon, "the old configuration holds on: [http]: ");
+    assert!(!served(&daemon).contains("renewed"));
+    made(&certificate, &key);
+    reload(&mut daemon, "the certificate of [http] renewed");
+    assert!(served(&daemon).contains("renewed"));
+    let checked = support::run(&["check", "--config", daemon.file.path()]);
+    assert!(checked.out.contains("ends in 8 days"), "{checked:?}");
     daemon.end();
 }
 

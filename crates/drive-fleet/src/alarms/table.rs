@@ -31,6 +31,8 @@ pub enum AlarmKind {
     AuditLog,
     /// The history cannot be written: what happens now waits in memory, and what finds no room there is lost.
     History,
+    /// The certificate by which the page is served ends soon or has ended: behind its end no browser comes in.
+    Certificate,
     /// A drive has run for so long, or was started so often, that something of it is to be seen to.
     Maintenance,
     /// The configuration could not be read again, or a reload has left a motor that may turn.
@@ -38,7 +40,7 @@ pub enum AlarmKind {
 }
 
 /// Those that are of no drive's own.
-const OTHERS: [AlarmKind; 10] = [
+const OTHERS: [AlarmKind; 11] = [
     AlarmKind::LineAway,
     AlarmKind::LineSilent,
     AlarmKind::LineFinding,
@@ -47,6 +49,7 @@ const OTHERS: [AlarmKind; 10] = [
     AlarmKind::RecordsLost,
     AlarmKind::AuditLog,
     AlarmKind::History,
+    AlarmKind::Certificate,
     AlarmKind::Maintenance,
     AlarmKind::Reload,
 ];
@@ -121,6 +124,12 @@ impl AlarmKind {
                 "the history cannot be written, what happens now waits in memory and may be lost",
                 Severity::Warning,
                 "see whether its disk is full; the log of the program says why",
+            ),
+            Self::Certificate => row(
+                "certificate",
+                "the certificate of the page ends soon or has ended, no browser comes in behind its end",
+                Severity::Warning,
+                "have it renewed; drived reload takes it",
             ),
             Self::Maintenance => row(
                 "maintenance",

@@ -1,5 +1,6 @@
 //! `drived run`: the fleet as a daemon.
 
+mod certificate;
 mod descriptors;
 mod eeprom;
 mod exit;
@@ -182,6 +183,10 @@ pub async fn run(args: Args) -> Result<(), Failure> {
         kept,
         (args.config, config),
     );
+    if let Some(tls) = doors.certificate() {
+        reloader.serves_by(tls.clone());
+        certificate::follow(tls, plant.clone());
+    }
     let first_hour = setup::Desk::new(reloader.clone());
     let router = api::router(plant.clone())
         .merge(api::reload_router(reloader.clone()))

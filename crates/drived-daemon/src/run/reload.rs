@@ -4,7 +4,7 @@ mod changes;
 
 use std::{
     path::{Path, PathBuf},
-    sync::{Arc, PoisonError},
+    sync::{Arc, OnceLock, PoisonError},
     time::Duration,
 };
 
@@ -28,6 +28,7 @@ use drived_config::{
     config::{DrivePart, NO_DRIVE, add},
     names::Names,
 };
+use drived_doors::{Pair, Tls};
 use drived_file::{Config, is_one_wire};
 use drived_http::api::Reload;
 use drived_plant::{
@@ -51,6 +52,8 @@ struct Inner {
     faces: Faces,
     opened: Opened,
     kept: Kept,
+    /// By what the page is served, if not in clear.
+    certificate: OnceLock<Tls>,
     file: PathBuf,
     /// What holds now.
     config: Mutex<Config>,
@@ -91,6 +94,7 @@ impl Reloader {
             faces,
             opened,
             kept,
+            certificate: OnceLock::new(),
             file,
             config: Mutex::new(config),
             last,
@@ -98,6 +102,20 @@ impl Reloader {
             leavings: std::sync::Mutex::default(),
             scanned: std::sync::Mutex::default(),
         }))
+    }
+
+    /// The page is served by this certificate from the start on.
+    pub(super) fn serves_by(&self, certificate: Tls) {
+        // It is there once, as long as the program.
+        let _ = self.0.certificate.set(certificate);
+    }
+
+    /// The certificate that takes the place of the one that is served, if the files have another.
+    async fn renewed(&self, new: &Config) -> Result<Option<Pair>, Failure> {
+        let Some(certificate) = self.0.certificate.get().cloned() else { return Ok(None) };
+        let files = new.doors.http.as_ref().and_then(|http| http.tls.clone());
+        let another = move || certificate.another(files.as_ref());
+        blocking(move || another().map_err(|why| Failure::Input(format!("[http]: {why}")))).await
     }
 
     /// No line is opened there until the claim is dropped. Whoever claims looks at the lines that are there behind it: a reload under way
@@ -231,11 +249,20 @@ impl Reloader {
         {
             read = Err(scanned);
         }
+        let renewed = match &read {
+            Ok(new) => self.renewed(new).await,
+            Err(_) => Ok(None),
+        };
+        let (read, renewed) = match renewed {
+            Ok(renewed) => (read, renewed),
+            Err(refused) => (Err(refused), None),
+        };
         if dry_run {
-            let changes = changes(&config, &read?);
+            let mut changes = changes(&config, &read?);
+            changes.extend(renewed.map(|_| Change::Certificate));
             return Ok(changes.iter().map(|change| change.would_be(&self.0.plant.fleet())).collect());
         }
-        self.take(&mut config, read).await
+        self.take(&mut config, read, renewed).await
     }
 
     /// What holds now, for whoever changes it: nobody does any more when the program is about to end, for who came then would end by no
@@ -330,7 +357,7 @@ impl Reloader {
             })
         };
         blocking(write).await?;
-        let done = self.take(&mut config, Ok(new)).await;
+        let done = self.take(&mut config, Ok(new), None).await;
         let Err(Failure::Input(why)) = done else { return done };
         // What does not hold is not found there by the next start.
         let put_back = move || match added.put_back(before.as_deref()) {
@@ -344,14 +371,26 @@ impl Reloader {
     }
 
     /// Makes what was read hold, and tells everybody.
-    async fn take(&self, config: &mut Config, read: Result<Config, Failure>) -> Result<Vec<String>, Failure> {
+    async fn take(
+        &self,
+        config: &mut Config,
+        read: Result<Config, Failure>,
+        renewed: Option<Pair>,
+    ) -> Result<Vec<String>, Failure> {
         let reloaded = match read {
             Ok(new) => {
                 for why in &new.left_out {
                     tracing::warn!("a profile is left out: {why}");
                 }
                 self.0.notify.reloading();
-                let done = self.carry_out(config, new).await;
+                let is_renewed = renewed.is_some();
+                if let (Some(pair), Some(certificate)) = (renewed, self.0.certificate.get()) {
+                    certificate.take(pair);
+                }
+                let mut done = self.carry_out(config, new).await;
+                if let Ok(done) = &mut done {
+                    done.changes.extend(is_renewed.then_some(Change::Certificate));
+                }
                 self.0.notify.reloaded();
                 done
             }

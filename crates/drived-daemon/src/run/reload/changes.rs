@@ -6,6 +6,7 @@ use drive_bus::LineConfig;
 use drive_fleet::{DriveSettings, Fleet};
 
 use drived_config::config::{DrivePart, LinePart};
+use drived_doors::config::HttpConfig;
 use drived_file::Config;
 
 /// What a reload does, in the order in which it is told.
@@ -32,6 +33,8 @@ pub(super) enum Change {
     FaceClosed(&'static str),
     /// Its table says something else: it is closed and opened anew.
     FaceChanged(&'static str),
+    /// Whoever connects from now on is served by another certificate.
+    Certificate,
     /// It holds from the next start on.
     Later(&'static str),
 }
@@ -115,7 +118,8 @@ impl Change {
             | Self::Groups
             | Self::FaceOpened(_)
             | Self::FaceClosed(_)
-            | Self::FaceChanged(_) => self.to_string(),
+            | Self::FaceChanged(_)
+            | Self::Certificate => self.to_string(),
             Self::ProfileLater(_) | Self::Later(_) => return None,
         })
     }
@@ -151,6 +155,7 @@ impl fmt::Display for Change {
             Self::FaceOpened(table) => write!(f, "{table} opened"),
             Self::FaceClosed(table) => write!(f, "{table} closed"),
             Self::FaceChanged(table) => write!(f, "{table} closed and opened anew"),
+            Self::Certificate => write!(f, "the certificate of [http] renewed"),
             Self::Later(what) => write!(f, "{what}: from the next start on"),
         }
     }
@@ -227,7 +232,7 @@ pub(super) fn changes(old: &Config, new: &Config) -> Vec<Change> {
     for (is_other, what) in [
         (old.snapshots != new.snapshots, "snapshots"),
         (old.shutdown != new.shutdown, "shutdown"),
-        (old.doors.http != new.doors.http, "[http]"),
+        (is_other_server(old.doors.http.as_ref(), new.doors.http.as_ref()), "[http]"),
         (old.doors.socket != new.doors.socket, "[socket]"),
         (old.doors.state.watchdogs != new.doors.state.watchdogs, "another file of watchdogs"),
         (old.doors.state.tokens != new.doors.state.tokens, "another file of tokens"),
@@ -263,6 +268,16 @@ fn renamed<'a>(
         same.next().map(|(_, (_, other))| (*name, *other))
     };
     stays.filter_map(now).collect()
+}
+
+/// Whether the page is to be served otherwise than by another certificate, which is taken now.
+fn is_other_server(old: Option<&HttpConfig>, new: Option<&HttpConfig>) -> bool {
+    match (old, new) {
+        (Some(old), Some(new)) if old.tls.is_some() && new.tls.is_some() => {
+            *old != HttpConfig { tls: old.tls.clone(), ..new.clone() }
+        }
+        _ => old != new,
+    }
 }
 
 /// Whether a line has to be opened anew. The pauses of its drives come and go with them.

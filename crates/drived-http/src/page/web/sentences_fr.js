@@ -58,11 +58,13 @@ export const SENTENCES_FR = {
   'see whether the motor turns; once its drive is in the configuration again, the stop is given anew': 'voir si le moteur tourne ; dès que son variateur est de nouveau dans la configuration, l’arrêt est redonné',
   'see whether a motor turns that should not, and stop it; then: drived alarms done NUMBER': 'voir si un moteur tourne qui ne le devrait pas, et l’arrêter ; ensuite : drived alarms done NUMÉRO',
   'see whether its disk is full; the log of the program says why': 'voir si son disque est plein ; le journal du programme dit pourquoi',
+  'have it renewed; drived reload takes it': 'le faire renouveler ; drived reload le prend',
   'see what is said of it, mend the file, and read it again': 'voir ce qui en est dit, corriger le fichier et le relire',
   'look at its supply, its address and its cable': 'vérifier son alimentation, son adresse et son câble',
 
   // What happens to the daemon itself.
   'the audit log cannot be written: only stops are carried out': 'le journal d’audit ne peut pas être écrit : seuls les arrêts sont exécutés',
+  'the certificate was renewed': 'le certificat a été renouvelé',
   'the audit log is written again': 'le journal d’audit est de nouveau écrit',
 
   // What to do about a state of the drive.

@@ -98,6 +98,7 @@ const TABLE = {
   alarm_records_lost: ['not all that was kept of runs and stops could be read, a stop or a run may be lost: a motor may turn', 'tout ce qui était conservé des marches et des arrêts n’a pas pu être lu, un arrêt ou une marche peut être perdu : un moteur peut tourner'],
   alarm_audit_log: ['the audit log cannot be written, only stops are carried out', 'le journal d’audit ne peut être écrit, seuls les arrêts sont exécutés'],
   alarm_history: ['the history cannot be written, what happens now waits in memory and may be lost', 'l’historique ne peut être écrit, ce qui se passe maintenant attend en mémoire et peut être perdu'],
+  alarm_certificate: ['the certificate of the page ends soon or has ended, no browser comes in behind its end', 'le certificat de la page arrive à son terme ou est échu, aucun navigateur n’entre au-delà'],
   alarm_maintenance: ['maintenance is due', 'un entretien est à faire'],
   alarm_reload: ['the configuration does not hold as it was read again', 'la configuration relue ne tient pas'],
   alarm_of_line: ['line {line}', 'ligne {line}'],

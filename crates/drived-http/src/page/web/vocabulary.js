@@ -154,6 +154,7 @@ const WORDS = {
   reload: ['Reload', 'Rechargement'],
   clock_stepped: ['Clock stepped', 'Horloge recalée'],
   audit_log: ['Audit log', 'Journal d’audit'],
+  certificate: ['Certificate', 'Certificat'],
   history: ['History', 'Historique'],
   began: ['Daemon begins', 'Début du service'],
   began_after_kill: ['Daemon begins, was killed', 'Début du service, qui avait été tué'],

@@ -74,8 +74,10 @@ impl Inner {
     /// What happens to the program itself is an alarm until it is said to be well again.
     pub(in crate::plant) fn note_for_alarms(&self, notice: &NoticeView) {
         let kind = AlarmKind::of_word(&notice.event);
-        let is_of_program =
-            |kind: &AlarmKind| matches!(kind, AlarmKind::AuditLog | AlarmKind::History | AlarmKind::Reload);
+        let is_of_program = |kind: &AlarmKind| {
+            use AlarmKind::{AuditLog, Certificate, History, Reload};
+            matches!(kind, AuditLog | Certificate | History | Reload)
+        };
         let Some(kind) = kind.filter(is_of_program) else { return };
         match notice.alarm {
             true => _ = self.alarms.wrong().insert(kind, notice.text.clone()),
