@@ -252,7 +252,7 @@ pub enum EventKind {
     StopUnconfirmed {
         /// Since when, as a duration.
         since: Duration,
-        /// How often it was sent, or may have been.
+        /// In how many attempts it was sent, or may have been: see [`PendingStop`](crate::PendingStop).
         attempts: u32,
         /// What is known of it.
         outcome: Outcome,

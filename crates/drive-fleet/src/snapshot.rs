@@ -193,7 +193,8 @@ pub struct PendingStop {
     #[cfg_attr(feature = "serde", serde(rename = "since_ms", with = "drive_core::serialize::age_ms"))]
     #[cfg_attr(feature = "schemars", schemars(with = "u64"))]
     pub since: Instant,
-    /// How often it was sent, or may have been, the attempt that is under way included.
+    /// In how many attempts it was sent, or may have been, that which is under way included. Each writes the stop anew, several times a
+    /// second, for as long as the drive does not show it: on the wire it was more often.
     pub attempts: u32,
     /// Whether the drive has shown that no run command is in force; what is missing then is standstill.
     pub taken: bool,
@@ -202,6 +203,16 @@ pub struct PendingStop {
 }
 
 impl PendingStop {
+    /// How it was sent, in words.
+    #[must_use]
+    pub fn sent(&self) -> String {
+        match self.attempts {
+            0 => "not sent yet".to_owned(),
+            1 => "sent in 1 attempt".to_owned(),
+            attempts => format!("sent in {attempts} attempts"),
+        }
+    }
+
     /// Whether a run command has come behind it since it was seen so before: the drive had taken it, and drives the motor again.
     #[must_use]
     pub fn is_undone_since(&self, before: &Self, motion: Motion) -> bool {

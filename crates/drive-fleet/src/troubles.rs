@@ -32,12 +32,7 @@ impl Snapshot {
         let (since, detail) = match kind {
             ConcernKind::StopUnconfirmed => {
                 let stop = self.stop.filter(|stop| stop.alarm)?;
-                let sent = match stop.attempts {
-                    0 => "not sent".to_owned(),
-                    1 => "sent 1 time".to_owned(),
-                    times => format!("sent {times} times"),
-                };
-                (Some(stop.since), Some(format!("{} stop, {sent}", stop.mode)))
+                (Some(stop.since), Some(format!("{} stop, {}", stop.mode, stop.sent())))
             }
             ConcernKind::RunCommandStands => (None, Some(self.run_command_stands.as_ref()?.to_string())),
             ConcernKind::LostRunning => (heard, (self.link == Link::Lost && was_moving).then(error)?),

@@ -320,11 +320,8 @@ impl Commanded {
                 }
                 _ = seconds.tick(), if !course.is_taken() => {
                     let waited = began.elapsed().as_secs();
-                    let sent = match self.handle.snapshot().stop.map_or(0, |stop| stop.attempts) {
-                        0 => "not sent yet".to_owned(),
-                        1 => "sent 1 time".to_owned(),
-                        times => format!("sent {times} times"),
-                    };
+                    let stop = self.handle.snapshot().stop;
+                    let sent = stop.map_or_else(|| "not sent yet".to_owned(), |stop| stop.sent());
                     let why = self.away().map_or_else(String::new, |why| format!(" ({why})"));
                     self.say(format_args!("{name} has not confirmed the stop after {waited} s, {sent}{why}: it goes on"));
                 }

@@ -67,5 +67,5 @@ fn waits_for(snapshot: &Snapshot, now: Instant) -> Option<String> {
         (None, None) => "no status".to_owned(),
     };
     let told = if stop.taken { "on its way down" } else { "not confirmed" };
-    Some(format!("{} ({shown}, stop sent {} times, {told})", snapshot.name, stop.attempts))
+    Some(format!("{} ({shown}, stop {}, {told})", snapshot.name, stop.sent()))
 }

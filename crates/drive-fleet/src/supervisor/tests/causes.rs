@@ -286,7 +286,7 @@ fn a_stop_whose_first_attempt_is_under_way_was_sent_once() {
     let concern = snapshot.concern(later).unwrap();
     assert_eq!(concern.kind, ConcernKind::StopUnconfirmed);
     assert_eq!(concern.lasts(later), Some(2_500 * MS));
-    assert_eq!(concern.to_string(), "STOP NOT CONFIRMED, the motor may turn: ramp stop, sent 1 time");
+    assert_eq!(concern.to_string(), "STOP NOT CONFIRMED, the motor may turn: ramp stop, sent in 1 attempt");
 }
 
 #[test]

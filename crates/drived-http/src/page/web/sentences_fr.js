@@ -391,7 +391,8 @@ const PATTERNS = [
     `par sa surveillance de communication${time ? ` après ${number(time)} sans message` : ''}${what ? ` : ${french(what)}` : ''}`],
   [/^after (.+) without a message(?:: (.+))?$/, (time, what) =>
     `après ${number(time)} sans message${what ? ` : ${french(what)}` : ''}`],
-  [/^(.+ stop), sent (\d+) times?$/, (stop, times) => `${reaction(stop)}, envoyé ${times} fois`],
+  [/^(.+ stop), sent in (\d+) attempts?$/, (stop, attempts) => `${reaction(stop)}, envoyé en ${attempts} tentative${attempts === '1' ? '' : 's'}`],
+  [/^(.+ stop), not sent yet$/, stop => `${reaction(stop)}, pas encore envoyé`],
   [/^(.+ stop) for (.+), (the drive is stopping|it is repeated)$/, (stop, time, how) =>
     `${reaction(stop)} depuis ${number(time)}, ${how === 'it is repeated' ? 'il est répété' : 'le variateur s’arrête'}`],
   [/^((?:current|thermal state) [^,]+ of [^,]+, .+)$/, all => all.split(', ').map(french).join(', ')],

@@ -40,8 +40,9 @@ pub(super) const PHRASES: &[(&str, &str)] = &[
     // What troubles it.
     ("for {}: {s}", "depuis {0} : {1}"),
     ("for {}", "depuis {0}"),
-    ("{s} stop, sent {} times", "arrêt {0}, envoyé {1} fois"),
-    ("{s} stop, sent once", "arrêt {0}, envoyé une fois"),
+    ("{s} stop, sent in {} attempts", "arrêt {0}, envoyé en {1} tentatives"),
+    ("{s} stop, sent in 1 attempt", "arrêt {0}, envoyé en 1 tentative"),
+    ("{s} stop, not sent yet", "arrêt {0}, pas encore envoyé"),
     ("{s} stop for {}, the drive is stopping", "arrêt {0} depuis {1}, le variateur s’arrête"),
     ("{s} stop for {}, it is repeated", "arrêt {0} depuis {1}, il est répété"),
     ("{r} instead of {r}", "{0} au lieu de {1}"),
