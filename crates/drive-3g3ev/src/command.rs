@@ -180,7 +180,7 @@ impl<P: Port> Drive3g3ev<P> {
                 status.verdict = None;
                 return Ok(Stopped { instead, ..Stopped::by(mode, status) });
             }
-            self.registers.tell_follower(&status);
+            self.registers.tell_follower(&status, &sent);
             if !seen {
                 // It takes two readings to see an output go down, and on a full line the first may take all of the time.
                 (first, confirming, seen) = (output, Confirming::begin(), true);

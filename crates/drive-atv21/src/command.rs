@@ -313,7 +313,7 @@ impl<P: Port> Atv21<P> {
                 let stopped = Stopped { instead, taken_from, ..Stopped::by(mode, status) };
                 return Ok(stopped.held_by(&self.watch.shaft));
             }
-            self.registers.tell_follower(&status);
+            self.registers.tell_follower(&status, &sent);
             first = first.or(output);
             let over = because.is_some() && held == word && Instant::now() >= settled;
             if over || !confirming.again().await {

@@ -180,8 +180,8 @@ impl<P: Port> Drivecom for Atv312<P> {
         self.registers.owe_judgement();
     }
 
-    fn tell_follower(&self, status: &Status) {
-        self.registers.tell_follower(status);
+    fn tell_follower<T>(&self, status: &Status, written: &Result<T>) {
+        self.registers.tell_follower(status, written);
     }
 
     fn as_written(&self, word: u16) -> u16 {

@@ -94,8 +94,8 @@ impl<P: Port> Drivecom for Atv58<P> {
         self.registers.owe_judgement();
     }
 
-    fn tell_follower(&self, status: &Status) {
-        self.registers.tell_follower(status);
+    fn tell_follower<T>(&self, status: &Status, written: &Result<T>) {
+        self.registers.tell_follower(status, written);
     }
 
     async fn read_status(&mut self, class: Class) -> Result<Status> {

@@ -18,7 +18,7 @@ use crate::{
     registers::{Place, Register, Row, Written},
     setpoint::Command,
     status::{RawWord, Status},
-    stopped::Follower,
+    stopped::{Followed, Follower},
 };
 
 /// How long a drive that answers that it is busy is asked again by a call without a lifetime, and how long one that has
@@ -142,10 +142,14 @@ impl<P: Port> Registers<P> {
         }
     }
 
-    /// Tells whoever follows it a status behind a stop that does not show yet. Of the run command that is to end it says nothing.
-    pub fn tell_follower(&self, status: &Status) {
+    /// Tells whoever follows it a status behind a stop that does not show yet, and how the last write of that ended. Of the run command
+    /// that is to end the status says nothing.
+    pub fn tell_follower<T>(&self, status: &Status, written: &Result<T>) {
         if let Some(follower) = &self.follower {
-            follower.send_replace(Some(Status { verdict: None, ..status.clone() }));
+            let status = Status { verdict: None, ..status.clone() };
+            // An exception is what the drive says. Every other end is the line's.
+            let denied = written.as_ref().err().filter(|error| matches!(error, Error::Exception { .. }));
+            follower.send_replace(Some(Followed { status, denied: denied.cloned() }));
         }
     }
 

@@ -346,7 +346,7 @@ pub trait Drive: Send {
         Intent::kept()
     }
 
-    /// Who hears of each status that a [`stop`](Self::stop) reads which does not show it yet: so a stop that is not obeyed, and is waited
+    /// Who hears of each status that a [`stop`](Self::stop) reads which does not show it yet, and of the drive's refusal: so a stop that is not obeyed, and is waited
     /// for as long as any, leaves nobody with what was so before it. It may tell nothing.
     fn follow_stops(&mut self, follower: Follower) {
         drop(follower);

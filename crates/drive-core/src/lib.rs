@@ -79,7 +79,7 @@ pub use serial::SerialSettings;
 pub use setpoint::{Command, Direction, Setpoint, StopMode};
 pub use state::{Control, State};
 pub use status::{Measurements, RawWord, Status};
-pub use stopped::{Follower, Stopped};
+pub use stopped::{Followed, Follower, Stopped};
 pub use turns::{STATUSES_PER_TURN, Turns};
 pub use units::{Current, Frequency, Percent, Power, Speed, UnitError, Voltage};
 pub use watch::Watch;

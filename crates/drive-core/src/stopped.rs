@@ -2,10 +2,19 @@
 
 use std::{fmt, time::Duration};
 
-use crate::{motion::Shaft, setpoint::StopMode, state::Control, status::Status};
+use crate::{error::Error, motion::Shaft, setpoint::StopMode, state::Control, status::Status};
 
-/// The end that a [drive tells](crate::Drive::follow_stops): the last status, once there is one.
-pub type Follower = tokio::sync::watch::Sender<Option<Status>>;
+/// The end that a [drive tells](crate::Drive::follow_stops): what was heard of it last, once there is anything.
+pub type Follower = tokio::sync::watch::Sender<Option<Followed>>;
+
+/// What a stop that does not show yet has heard of its drive.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Followed {
+    /// The status that was read behind it.
+    pub status: Status,
+    /// The exception by which the drive has answered the last word that was written for it; `None` where it took that, or said nothing.
+    pub denied: Option<Error>,
+}
 
 /// A stop that the drive shows: no run command is in force any more. The motor may still be coming down.
 #[derive(Debug, Clone, PartialEq, Eq)]

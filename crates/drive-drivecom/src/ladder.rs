@@ -66,8 +66,8 @@ pub trait Drivecom: Send {
     /// A word that commands the motor was written, or may be: see [`Registers::owe_judgement`](drive_core::Registers::owe_judgement).
     fn owes_judgement(&mut self);
 
-    /// A status behind a stop that does not show yet.
-    fn tell_follower(&self, status: &Status);
+    /// A status behind a stop that does not show yet, and how the last write of it ended.
+    fn tell_follower<T>(&self, status: &Status, written: &Result<T>);
 
     /// Why this drive is not to be started, from a fresh status: local control, a forbidden direction, settings. That
     /// it has not tripped, is in a known state and shows no output in a quick stop is checked apart. May read more of the
@@ -340,7 +340,7 @@ pub async fn stop<D: Drivecom>(drive: &mut D, mode: StopMode) -> Result<Stopped>
             let taken_from = before.filter(|_| status.control == Some(Control::Bus));
             return Ok(Stopped { taken_from, ..stopped(stop, status) });
         }
-        drive.tell_follower(&status);
+        drive.tell_follower(&status, &written);
         let defies = drive.defies_stop(&status);
         if defies.is_some() || !confirming.again().await {
             // What the last write ended in says more than that nothing shows.

@@ -9,7 +9,7 @@ use std::{
 };
 
 use drive_bus::{Latest, Slave};
-use drive_core::{Drive, Lease, Status};
+use drive_core::{Drive, Followed, Lease};
 use futures_util::{FutureExt, future::poll_immediate};
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
@@ -95,7 +95,7 @@ struct Talk {
     losses: Latest<u64>,
     retractions: Latest<u64>,
     /// What a stop has read that does not show yet.
-    followed: watch::Receiver<Option<Status>>,
+    followed: watch::Receiver<Option<Followed>>,
 }
 
 impl Talk {
@@ -241,9 +241,9 @@ impl Talk {
                         break;
                     }
                     // A stop that is not obeyed is waited for by its driver alone: what that reads meanwhile is what is so.
-                    status = next_of(followed), if talking => {
-                        if let Some(status) = status {
-                            desk.supervisor.handle_followed(Instant::now(), status);
+                    heard = next_of(followed), if talking => {
+                        if let Some(heard) = heard {
+                            desk.supervisor.handle_followed(Instant::now(), heard);
                         }
                         false
                     }
@@ -299,8 +299,8 @@ async fn changed(count: &mut Latest<u64>) {
     }
 }
 
-/// The next status of a stop, and for ever where none is told.
-async fn next_of(followed: &mut watch::Receiver<Option<Status>>) -> Option<Status> {
+/// What a stop hears next, and for ever where nothing is told.
+async fn next_of(followed: &mut watch::Receiver<Option<Followed>>) -> Option<Followed> {
     match followed.changed().await {
         Ok(()) => followed.borrow_and_update().clone(),
         Err(_) => std::future::pending().await,

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use drive_atv312::{Atv312, CAPABILITIES};
 use drive_bus::{Line, LineConfig};
-use drive_core::{SerialSettings, StopMode};
-use drive_fleet::{DriveSettings, Fleet};
+use drive_core::{Error, SerialSettings, StopMode};
+use drive_fleet::{DriveSettings, Fleet, Outcome, Times, Unconfirmed, Unknown};
 use drive_sim::{SimLine, Wiring};
 use drive_testing::words::Words;
 use tokio::time::{Instant, sleep};
@@ -56,4 +56,38 @@ async fn behind_a_stop_that_is_not_obeyed_no_status_gets_older_than_a_poll() {
     }
     assert!(oldest <= Duration::from_secs(1), "{oldest:?}, in virtual time");
     assert!(!stop.await.is_confirmed());
+}
+
+/// Its driver writes the stop anew for as long as one attempt takes: who asks meanwhile hears what the drive says to it.
+#[tokio::test(start_paused = true)]
+async fn that_a_drive_refuses_the_words_of_a_stop_is_told_before_the_first_attempt_is_over() {
+    // Illegal function denies it; behind a failure of the device (04) nobody knows.
+    for (by, is_denied) in [(1, true), (4, false)] {
+        let settings = SerialSettings::MODBUS_DEFAULT;
+        let site = SimLine::new(Wiring::rtu(settings));
+        let line = Line::over(site.in_memory(), LineConfig::stream(settings));
+        let mut words = Words::new(&CAPABILITIES, &RUNS);
+        words.refuses_writes = Some(by);
+        let times = Times { stop_alarm: Duration::from_secs(1), ..Times::default() };
+        let fleet = Fleet::builder()
+            .line("north", line)
+            .drive(
+                "north",
+                1,
+                DriveSettings { times, ..DriveSettings::controlled("pump") },
+                move |_, slave| Box::new(Atv312::new(words, slave)),
+            )
+            .start()
+            .unwrap();
+        let pump = fleet.drive("pump").unwrap();
+        pump.wait_until(|seen| seen.status.is_some()).await;
+        let outcome = pump.stop(StopMode::Ramp).await;
+        let told = match &outcome {
+            Outcome::NotConfirmed(Unconfirmed::StopDenied { error, .. }) if is_denied => Some(error),
+            Outcome::OutcomeUnknown(Unknown { error, .. }) if !is_denied => error.as_ref(),
+            _ => None,
+        };
+        assert!(matches!(told, Some(Error::Exception { code, .. }) if *code == by), "{by}: {outcome}");
+        assert_eq!(pump.snapshot().stop.map(|stop| stop.attempts), Some(1), "{by}");
+    }
 }

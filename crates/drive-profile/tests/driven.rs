@@ -1122,7 +1122,7 @@ async fn who_follows_a_stop_that_is_not_obeyed_hears_of_each_status_that_is_read
             stopped = &mut stop => break stopped,
             told = followed.changed() => {
                 told.expect("the drive is there");
-                let status = followed.borrow_and_update().clone().expect("it is told");
+                let status = followed.borrow_and_update().clone().expect("it is told").status;
                 assert_eq!((status.state, status.verdict), (State::Running, None), "{status:?}");
                 heard += 1;
             }

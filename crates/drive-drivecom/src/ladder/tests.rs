@@ -75,7 +75,7 @@ impl Drivecom for Chart {
 
     fn owes_judgement(&mut self) {}
 
-    fn tell_follower(&self, _: &Status) {}
+    fn tell_follower<T>(&self, _: &Status, _: &Result<T>) {}
 
     async fn read_status(&mut self, class: Class) -> Result<Status> {
         self.classes.push(class);

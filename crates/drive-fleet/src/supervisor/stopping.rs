@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use drive_core::{
-    Command, Error, ErrorKind, Frequency, INJECTION_AT_MOST, Motion, Refusal, Result, Setpoint, Status,
-    StopMode, Stopped,
+    Command, Error, ErrorKind, Followed, Frequency, INJECTION_AT_MOST, Motion, Refusal, Result, Setpoint,
+    Status, StopMode, Stopped,
 };
 use tokio::time::Instant;
 
@@ -327,11 +327,19 @@ impl Supervisor {
         (stopping.next_try? <= now).then_some(Job::Stop(stopping.mode))
     }
 
-    /// What the attempt has read that is under way: it does not show the stop yet.
-    pub(crate) fn handle_followed(&mut self, now: Instant, status: Status) {
-        if matches!(self.in_flight, Some(Job::Stop(_))) {
-            self.accept_status(now, status);
+    /// What the attempt has heard that is under way: the status does not show the stop yet, and the drive may have refused its word.
+    pub(crate) fn handle_followed(&mut self, now: Instant, heard: Followed) {
+        let Followed { status, denied } = heard;
+        if !matches!(self.in_flight, Some(Job::Stop(_))) {
+            return;
         }
+        if let Some(stopping) = &mut self.stopping {
+            // Whoever asks before the attempt ends is told so, and no more once the drive takes the words again.
+            if denied.is_some() || matches!(stopping.error, Some(Error::Exception { .. })) {
+                stopping.error = denied;
+            }
+        }
+        self.accept_status(now, status);
     }
 
     pub(super) fn handle_stopped(&mut self, now: Instant, result: Result<Stopped>) {

@@ -86,7 +86,7 @@ impl<P: Port> ProfileDrive<P> {
                 let stopped = Stopped { instead, ..Stopped::by(mode, Status { verdict: None, ..status }) };
                 return Ok(stopped.held_by(&self.watch.shaft));
             }
-            self.registers.tell_follower(&status);
+            self.registers.tell_follower(&status, &written);
             first = first.or(status.output_frequency);
             if Instant::now() >= again {
                 written = self.write_stop(action, order).await.map_err(Error::after_write)?;
