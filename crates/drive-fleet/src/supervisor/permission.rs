@@ -249,8 +249,9 @@ impl Supervisor {
 
     fn allow_setpoint(&self, now: Instant, setpoint: Setpoint) -> Result<(), Refused> {
         let moving = self.status.as_ref().filter(|status| !status.value.is_undriven());
-        let at_least = |status| crate::mutant!("unknown-setpoint-unlimited", shown(status), None);
-        let last = moving.and_then(|status| self.given.or_else(|| at_least(status)));
+        let last = moving.and_then(|status| {
+            self.given.or_else(|| crate::mutant!("unknown-setpoint-unlimited", shown(status), None))
+        });
         let allowed = self.settings.limits.allow(now, setpoint, last);
         crate::mutant!("limit-passed", allowed, Ok(())).map_err(Refused::Limit)
     }

@@ -201,8 +201,10 @@ impl Supervisor {
         // Of one that was never written the run command of before is none.
         let is_its = match active.order {
             Order::Start { direction, .. } => {
-                let its = |lease: Lease| lease.direction == direction;
-                self.lease.is_some_and(|lease| crate::mutant!("lease-of-before-confirms", its(lease), true))
+                let same_way = |lease: Lease| {
+                    crate::mutant!("lease-of-before-confirms", lease.direction == direction, true)
+                };
+                self.lease.is_some_and(same_way)
             }
             _ => true,
         };
