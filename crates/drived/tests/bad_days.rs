@@ -95,7 +95,7 @@ fn a_line_that_is_never_quiet_ends_status_and_scan_with_words_and_the_stop_is_se
 }
 
 #[test]
-fn a_stop_counts_what_was_sent() {
+fn a_stop_counts_the_attempts_in_which_it_was_sent() {
     let heard: Arc<Mutex<Vec<u8>>> = Arc::default();
     let kept = Arc::clone(&heard);
     // It hears and never answers.
@@ -108,7 +108,7 @@ fn a_stop_counts_what_was_sent() {
     let [rtu, _] = lines(port);
     let stop = run(&["stop", "--line", &rtu, "--drive", "atv28@1"]);
     stop.assert_stop_not_confirmed();
-    let told = stop.out.lines().rev().find_map(|line| line.split_once("sent ")?.1.split_once(' '));
+    let told = stop.out.lines().rev().find_map(|line| line.split_once("sent in ")?.1.split_once(' '));
     let told: usize = told.map_or(1, |(number, _)| number.parse().expect("a number"));
     let sent = heard.lock().expect("nobody panics").windows(4).filter(|bytes| *bytes == STOP).count();
     assert!(told >= 1 && sent >= told, "{told} told, {sent} sent: {stop:?}");

@@ -143,7 +143,7 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
         (["explain" | "capture"], "NAME") => lines(),
         // They are given here.
         (["init" | "scan"] | ["token", _], "NAME") => Offers::default(),
-        (["faults"] | ["names" | "param", _], "NAME") => drives(),
+        (["accept" | "faults"] | ["names" | "param", _], "NAME") => drives(),
         (_, "NAME" | "NAME|SETPOINT") => drives().and(groups()),
         (["param", action], "[NAME] REGISTER" | "[NAME] REGISTER VALUE") => {
             words_of_param(place, known, action).unwrap_or_else(drives)
@@ -184,8 +184,8 @@ fn values(place: &Place<'_>, known: &Known, arg: &Arg, typed: &str) -> Offers {
         // Numbers, times and texts are the person's own.
         (
             _,
-            "ADDRESS" | "ADDRESSES" | "FREQUENCY" | "HEAD" | "KEY" | "MINUTES" | "MNEMONIC" | "N" | "NUMBER"
-            | "PERSON" | "SECONDS" | "SETPOINT" | "TEXT" | "TIME" | "WORD",
+            "ADDRESS" | "ADDRESSES" | "FREQUENCY" | "HEAD" | "IDENTITY" | "KEY" | "MINUTES" | "MNEMONIC"
+            | "N" | "NUMBER" | "PERSON" | "SECONDS" | "SETPOINT" | "TEXT" | "TIME" | "WORD",
         ) => Offers::default(),
         _ => Offers::default(),
     }
