@@ -586,7 +586,7 @@ def many(page, url):
     expect(page.locator("main h1")).to_have_text("drive 61")
     page.go_back()
     expect(page.locator(".rows .row a").first).to_have_text("drive 200")
-    page.wait_for_function("document.activeElement.textContent === 'drive 61'")
+    until(page, "document.activeElement.textContent === 'drive 61'")
     assert abs(row.bounding_box()["y"] - above) < 3, (row.bounding_box(), above)
     # A lone % is no blank page, and the skip link leaves no drive.
     page.goto(f"{url}#/drive/50%")
@@ -833,7 +833,7 @@ def touched(page, url, token):
                 page.goto(url + view)
                 expect(page.locator("main h1")).to_be_attached()
                 # The view is there when something of it is.
-                page.wait_for_function("document.querySelector('main').childElementCount > 1")
+                until(page, "document.querySelector('main').childElementCount > 1")
                 widths = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
                 assert widths[0] <= widths[1], (view, width, widths)
                 low = page.evaluate("""[...document.querySelectorAll('button, select, nav a, input:not([type=checkbox], [type=range])')]
@@ -875,7 +875,7 @@ def pairs(page, url):
 
 
 def until(page, true):
-    """Waits until this becomes true, which is a promise."""
+    """Waits until this becomes true, which may be a promise. What Playwright would ask again by itself the page's own policy forbids."""
     end = time.monotonic() + PATIENCE_MS / 1000
     while not page.evaluate(true):
         assert time.monotonic() < end, true
@@ -1032,7 +1032,7 @@ def first_hour(page, url, link, port, keys=False):
     hand.press(page.get_by_role("button", name="Start forward"))
     hand.press(page.locator("dialog button.primary"))
     expect(page.locator(".drive-head")).to_have_attribute("data-state", "running")
-    page.wait_for_function("parseFloat(document.querySelector('.big dd').textContent) >= 24.9")
+    until(page, "parseFloat(document.querySelector('.big dd').textContent) >= 24.9")
     print(f"first hour: {time.monotonic() - hand.began:.0f} s, {hand.done} clicks and fields{' by keys alone' if keys else ''}", file=sys.stderr)
     # The link was good once.
     other = page.context.browser.new_context().new_page()
