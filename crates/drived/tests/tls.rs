@@ -182,7 +182,11 @@ fn a_renewed_certificate_is_served_after_a_reload_and_one_whose_key_does_not_fit
     reload(&mut daemon, "the certificate of [http] renewed");
     assert!(served(&daemon).contains("renewed"));
     let checked = support::run(&["check", "--config", daemon.file.path()]);
-    assert!(checked.out.contains("ends in 8 days"), "{checked:?}");
+    // Nine whole days, or less by what has passed since it was made.
+    assert!(
+        ["8", "9"].iter().any(|days| checked.out.contains(&format!("ends in {days} days"))),
+        "{checked:?}"
+    );
     daemon.end();
 }
 
