@@ -83,6 +83,7 @@ async fn every_answer_and_every_refusal_is_as_the_document_says() {
                     Some("start" | "setpoint") => json!({"setpoint": {"frequency_hz": 20.0}}),
                     Some("shelve") => json!({"minutes": 5, "why": "a test"}),
                     Some("{register}") => json!({"value": "50"}),
+                    Some("accept") => json!({"identity": {"model": "ATV312HU15N4", "codes": []}}),
                     _ => json!({}),
                 };
                 let (mut body, mut odd) = (body, json!({"id": 7}));
