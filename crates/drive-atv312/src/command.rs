@@ -368,6 +368,7 @@ impl<P: Port> Drivecom for Atv312<P> {
 
     async fn corrected_stop(&mut self, asked: StopMode, sent: StopWord) -> Option<StopWord> {
         let before = self.known.settings.kept(self.high_bits);
+        let mut led = before;
         let was_known = self.known.settings.knows_stop();
         if was_known {
             self.read_meanings(Class::Command).await.ok()?;
@@ -375,6 +376,12 @@ impl<P: Port> Drivecom for Atv312<P> {
         // A drive that has no LAC never tells them, however often it is asked.
         while !self.known.settings.knows_stop() && !self.known.settings.is_complete() {
             self.read_setting(Class::Command).await.ok()?;
+            // Until the bit is known that leads the command to the bus, a stop of the bus may have left the motor to the terminals.
+            let kept = self.known.settings.kept(self.high_bits);
+            if kept != led {
+                led = kept;
+                self.write_control(Class::Stop, sent.word, Effect::Level).await.ok()?;
+            }
         }
         // A quick stop that went out while nothing was known is not turned into a slower one.
         let stop = if was_known { self.known.settings.stop(asked) } else { sent };

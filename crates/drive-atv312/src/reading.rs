@@ -48,25 +48,24 @@ impl Resolution {
 
     /// The word for a frequency, if there is one that reads back as this very frequency.
     pub(crate) fn word(self, frequency: Frequency) -> Option<u16> {
-        match self {
-            Self::Normal => frequency.exact_decihertz(),
-            Self::High => {
-                let counts = (u64::from(frequency.centihertz()) * 32_767 + 30_000) / 60_000;
-                let word = u16::try_from(counts).ok().filter(|&word| word <= i16::MAX.unsigned_abs())?;
-                (self.frequency(word) == frequency).then_some(word)
-            }
-        }
+        let word = self.nearest(frequency)?;
+        (self.frequency(word) == frequency).then_some(word)
     }
 
     /// The word that stands nearest for what `word` was at the resolution of `before`, with its sign.
     pub(crate) fn recounted(self, word: u16, before: Self) -> u16 {
-        let centihertz = u64::from(before.frequency(word).centihertz());
+        let counts = self.nearest(before.frequency(word)).unwrap_or(i16::MAX.unsigned_abs());
+        if word.cast_signed() < 0 { counts.wrapping_neg() } else { counts }
+    }
+
+    /// The count that is nearest to a frequency, of those that a signed word has.
+    fn nearest(self, frequency: Frequency) -> Option<u16> {
+        let centihertz = u64::from(frequency.centihertz());
         let counts = match self {
             Self::Normal => (centihertz + 5) / 10,
             Self::High => (centihertz * 32_767 + 30_000) / 60_000,
         };
-        let word_of = u16::try_from(counts).unwrap_or(u16::MAX).min(i16::MAX.unsigned_abs());
-        if word.cast_signed() < 0 { word_of.wrapping_neg() } else { word_of }
+        u16::try_from(counts).ok().filter(|&counts| counts <= i16::MAX.unsigned_abs())
     }
 
     /// The step of a frequency setpoint, for errors.

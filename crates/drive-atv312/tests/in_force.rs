@@ -121,11 +121,11 @@ async fn where_bit_13_selects_the_command_channel_it_stays_with_the_bus() {
         drive.stop(mode).await.unwrap();
         assert_eq!(commands(drive), [word], "{mode}");
     }
-    // Never read: at once a word that stops, then the one that takes the channel back.
+    // Never read: at once a word that stops, then the one that takes the channel back, as soon as that is known and when all is.
     let terminals = [(3206, 0x0002)];
     let mut drive = drive(&[&FOR_THE_BUS, &STANDS, &switched, &terminals]);
     drive.stop(StopMode::Ramp).await.unwrap();
-    assert_eq!(commands(drive), [0x0002, 0x2002]);
+    assert_eq!(commands(drive), [0x0002, 0x2002, 0x2002]);
     // Read before a reconnect: bit 13 as it was known.
     let mut drive = watched(&[&FOR_THE_BUS, &RUNS, &switched]).await;
     drive.forget();

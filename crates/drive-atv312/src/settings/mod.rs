@@ -56,16 +56,17 @@ enum When {
 }
 use When::{Always, AtL3, Switched};
 
-/// Every setting that is read, those that decide a stop first. No list of the manual has the words between the blocks.
+/// Every setting that is read, those that decide a stop first, and of these the ones that say whose the command is. No list of the manual has
+/// the words between the blocks.
 const BLOCKS: &[Block] = &[
     (address::LAC, 1, Always),
-    // Stt, nSt, dCI, FSt.
-    (address::STT, span(address::STT, address::FST), Always),
     (address::CCS, 1, AtL3),
     (address::CD1, span(address::CD1, address::CD2), Switched),
     (address::CHCF, 1, Switched),
     (address::RFC, 1, AtL3),
     (address::FR1, span(address::FR1, address::FR2), AtL3),
+    // Stt, nSt, dCI, FSt.
+    (address::STT, span(address::STT, address::FST), Always),
     (address::RPS, 1, AtL3),
     (address::LC2, 1, AtL3),
     (address::ETF, 1, AtL3),
@@ -78,8 +79,10 @@ const BLOCKS: &[Block] = &[
     (address::ATR, 1, Always),
     (address::ADC, 1, Always),
 ];
+/// The blocks that say by which bit of the bus the command is switched, if by any: who has the reference has it too unless `CHCF` = SEP.
+const FOR_THE_COMMAND: usize = 4;
 /// The blocks that decide a stop: at L1 and L2, and at L3, where any bit above the chart's may have got another meaning.
-const FOR_A_STOP: (usize, usize) = (2, 13);
+const FOR_A_STOP: (usize, usize) = (7, 13);
 /// The functions that a bit of the control word can be assigned to, besides the stops.
 const FUNCTIONS: [u16; 10] = [
     address::RPS,
@@ -174,6 +177,11 @@ impl Settings {
             Some(AccessLevel::L3) => self.blocks >= FOR_A_STOP.1,
             Some(AccessLevel::Unknown(_)) => true,
         }
+    }
+
+    /// Whether it is known which bit of the bus switches the command.
+    fn knows_command(&self) -> bool {
+        self.level() == Some(AccessLevel::L3) && self.blocks >= FOR_THE_COMMAND
     }
 
     /// What stops this drive in a mode, by the control word without the bits that have another function.
@@ -285,10 +293,10 @@ impl Settings {
     pub(crate) fn kept(&self, held: u16) -> u16 {
         match self.level() {
             Some(AccessLevel::L1 | AccessLevel::L2) => return 0,
-            Some(AccessLevel::L3) if self.knows_stop() => {}
+            Some(AccessLevel::L3) if self.knows_command() => {}
             _ => return held,
         }
-        let mut kept = held & self.functions().bits();
+        let mut kept = if self.knows_stop() { held & self.functions().bits() } else { held };
         let command = if self.word(CHCF) == SEPARATE {
             self.towards_bus(CCS, [CD1, CD2], COMMAND_BY_MODBUS)
         } else {

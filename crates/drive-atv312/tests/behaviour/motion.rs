@@ -1,5 +1,6 @@
 //! Starts, stops, setpoints: what moves the motor and what refuses to.
 
+use drive_atv312::Atv312;
 use drive_core::{
     Control, Direction, Drive, Error, ErrorKind, Frequency, Motion, Refusal, Setpoint, SetpointProblem,
     Speed, State, StopMode,
@@ -391,6 +392,29 @@ async fn a_function_that_was_set_on_a_bit_while_the_motor_stood_is_known_to_the_
     assert_eq!(stopped.mode, StopMode::Fast);
     assert!(stopped.instead.is_some_and(|why| why.contains("bit 12")), "{stopped:?}");
     assert!(commands(&machine)[before..].iter().all(|word| word & 0x100F != 0x100F), "{machine:?}");
+}
+
+/// With LAC = L3, CHCF = SEP and CCS = C112 bit 12 of CMD leads the command to Cd1, here the terminals, where it is 0, and to Cd2, the bus, where
+/// it is 1 (BBV51701 p. 37). Who has read none of that gives it to them by the first word of his stop, and LI1 is closed.
+#[tokio::test(start_paused = true)]
+async fn a_stop_of_somebody_who_knows_no_setting_has_the_command_back_before_it_reads_the_others() {
+    let (mut drive, machine, line) = rig();
+    for (code, value) in [("Cd1", 1), ("Cd2", 10), ("CCS", 188), ("tCt", 0)] {
+        assert!(machine.poke(row(code).address, value), "{code}");
+    }
+    bench::write(&line, row("CMD").address, 0x1000).await;
+    bench::run_at_fifty(&mut drive, &machine).await;
+    assert!(machine.poke(row("IOLR").address, 1));
+    let before = machine.received().len();
+    let mut other = Atv312::new(line.slave(1), bench::address(1));
+    let stopped = other.stop(StopMode::Fast).await.unwrap();
+    assert_eq!(stopped.status.control, Some(Control::Bus));
+    machine.wait_until(|seen| !seen.running).await;
+    let behind: Vec<_> =
+        machine.received().split_off(before).into_iter().map(|request| request.pdu).collect();
+    let of_bus = behind.iter().position(|pdu| pdu[0] != 0x03 && pdu[3] & 0x10 != 0);
+    // The stop, a status, LAC, CCS, Cd1 with Cd2, and CHCF.
+    assert_eq!(of_bus, Some(6), "{behind:x?}");
 }
 
 #[tokio::test(start_paused = true)]
