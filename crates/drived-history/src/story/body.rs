@@ -15,6 +15,9 @@ pub(super) struct OfSeveral {
 pub(super) struct OfOne {
     pub(super) drive: Option<String>,
     pub(super) outcome: String,
+    /// Why, in words.
+    #[serde(default)]
+    pub(super) text: Option<String>,
 }
 
 /// An event as far as it is looked at here.

@@ -1,5 +1,6 @@
 //! What speaks for a cause: what was asked for here, what was seen beside it, and within which time it happened.
 
+use drive_fleet::Refused;
 use drived_plant::plant::past::{
     Certainty::{Likely, NotKnown, Seen},
     LineMinuteView, RecordView, SentenceView as Sentence,
@@ -58,10 +59,21 @@ pub(super) fn asked_before<'a>(
     })
 }
 
-/// Whether a command was, or may have been, on the wire: one that was refused moved nothing.
+/// Whether a command was, or may have been, on the wire: one that was refused moved nothing. What something newer overtook may have been
+/// carried out in part, unless it is told that it was overtaken before.
 fn was_sent(facts: &Facts, found: &RecordView) -> bool {
-    let outcome = facts.of_several(found).map(|one| one.outcome).or_else(|| body(found).outcome);
-    !matches!(outcome.as_deref(), Some("refused" | "expired" | "superseded" | "nothing"))
+    let (outcome, why) = match facts.of_several(found) {
+        Some(one) => (Some(one.outcome), one.text.unwrap_or_default()),
+        None => (body(found).outcome, found.text.clone()),
+    };
+    match outcome.as_deref() {
+        Some("refused" | "expired" | "nothing") => false,
+        Some("superseded") => {
+            let before = [Refused::Stopped, Refused::Superseded].map(|unsent| unsent.to_string());
+            !before.iter().any(|unsent| why.contains(unsent))
+        }
+        _ => true,
+    }
 }
 
 /// A command without what became of it, which was told later than what it is told with.

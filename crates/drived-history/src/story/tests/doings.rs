@@ -1,5 +1,6 @@
 //! Whose doing something was, in nights that somebody had staged: what looks like somebody's at the drive, and was not.
 
+use drive_fleet::{Outcome, Refused, Unconfirmed};
 use serde_json::json;
 
 use super::{Certainty, NIGHT_MS, Says as _, Written};
@@ -82,6 +83,28 @@ fn a_run_that_this_program_had_begun_before_it_was_killed_is_not_told_as_somebod
     other.event(338_373, "run_not_adopted", text, None);
     let story = other.told(338_000);
     assert!(story.about.as_ref().unwrap().text.contains("is not ours"), "{story:?}");
+}
+
+/// Somebody starts a drive, and somebody else stops it before it is confirmed: before its run word went out, or behind it.
+#[test]
+fn a_start_that_a_stop_overtook_is_a_cause_where_it_was_sent_and_none_where_it_was_not() {
+    for (overtaken, is_cause) in [
+        (Outcome::NotConfirmed(Unconfirmed::Stopped), true),
+        (Outcome::NotConfirmed(Unconfirmed::Superseded), true),
+        (Outcome::Refused(Refused::Stopped), false),
+        (Outcome::Refused(Refused::Superseded), false),
+    ] {
+        let mut night =
+            Written::begin(&format!("moment-overtaken-{}-{is_cause}", overtaken.reason().unwrap()));
+        night.heard_for(400);
+        let text = format!("start forward by shift from http 127.0.0.1: {overtaken}");
+        let body = json!({ "outcome": overtaken.word(), "text": overtaken.text() });
+        night.kept(Kind::Command, Some("pump 1"), 302_000, "start", &text, Some(body));
+        night.changed(302_500, "ready", "running", "drive");
+        let story = night.told(302_000);
+        assert_eq!(story.why(Certainty::Likely).contains("by shift"), is_cause, "{story:?}");
+        assert_eq!(format!("{:?}", story.why).contains("nobody here asked"), !is_cause, "{story:?}");
+    }
 }
 
 /// Another master wrote OFF1 at 325.005 s: 27.17 Hz at 325.164 s, 1.26 Hz at 326.719 s, and the withdrawal was confirmed at 326.811 s.
