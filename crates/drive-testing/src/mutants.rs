@@ -58,11 +58,17 @@ pub enum Mutant {
     NothingWrittenSaidOfAll,
     /// A start of which no answer came has no lease.
     LeaseWantsAnAnswer,
+    /// Whoever has control, the bus has it.
+    ControlAlwaysTheBus,
+    /// A run command is withdrawn by a stop, whoever has given it.
+    WithdrawalStopsWhoever,
+    /// A reset is sent whether it has tripped or not.
+    ResetWithoutATrip,
 }
 
 impl Mutant {
     /// All of them.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 24] = [
         Self::StartConfirmedByAnything,
         Self::StopConfirmedByAnything,
         Self::RunTwice,
@@ -84,6 +90,9 @@ impl Mutant {
         Self::AnyStartMay,
         Self::NothingWrittenSaidOfAll,
         Self::LeaseWantsAnAnswer,
+        Self::ControlAlwaysTheBus,
+        Self::WithdrawalStopsWhoever,
+        Self::ResetWithoutATrip,
     ];
 
     /// The family of a contract with this fault in it.

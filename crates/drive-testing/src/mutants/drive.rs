@@ -4,10 +4,10 @@ use std::time::Duration;
 
 use async_trait::async_trait;
 use drive_core::{
-    BroadcastWrite, Capabilities, Direction, Drive, Error, ErrorKind, Faults, Follower, Frequency, Ground,
-    Identity, Intent, KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, PortError, Reaction,
-    Recognised, Refusal, Result, Row, SelfRestart, Setpoint, SlaveAddress, Status, StopMode, Stopped,
-    Verdict, Watchdog, WatchdogCapability, Withdrawn, Written, registers::Place,
+    BroadcastWrite, Capabilities, Control, Direction, Drive, Error, ErrorKind, Faults, Follower, Frequency,
+    Ground, Identity, Intent, KeptReadings, Lack, Lease, Lifetimes, Measurements, Motion, PortError,
+    Reaction, Recognised, Refusal, Result, Row, SelfRestart, Setpoint, SlaveAddress, Status, StopMode,
+    Stopped, Verdict, Watchdog, WatchdogCapability, Withdrawn, Written, registers::Place,
 };
 
 use super::{Mutant, port::Tap};
@@ -51,6 +51,9 @@ impl Faulty {
         }
         if self.ended {
             status.verdict = None;
+        }
+        if self.is(Mutant::ControlAlwaysTheBus) && status.control.is_some() {
+            status.control = Some(Control::Bus);
         }
         status
     }
@@ -185,6 +188,9 @@ impl Drive for Faulty {
     }
 
     async fn withdraw(&mut self) -> Result<Withdrawn> {
+        if self.is(Mutant::WithdrawalStopsWhoever) {
+            return self.drive.stop(StopMode::Ramp).await.map(|stopped| Withdrawn::Ended(stopped.status));
+        }
         match self.drive.withdraw().await {
             Err(error) if self.is(Mutant::WithdrawalConfirmedByAnything) => {
                 self.anything(error).await.map(Withdrawn::Ended)
@@ -201,6 +207,10 @@ impl Drive for Faulty {
     }
 
     async fn reset_faults(&mut self) -> Result<Status> {
+        // A word that resets lets a motor coast in most families: it is what a stop by freewheel writes.
+        if self.is(Mutant::ResetWithoutATrip) && !self.drive.status().await?.is_fault() {
+            return self.drive.stop(StopMode::Freewheel).await.map(|stopped| stopped.status);
+        }
         self.tap.resets(true);
         let reset = self.drive.reset_faults().await;
         self.tap.resets(false);

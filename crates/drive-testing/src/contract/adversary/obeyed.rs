@@ -2,7 +2,7 @@
 
 use std::{iter, time::Duration};
 
-use drive_core::{Class, Direction, Error, StopMode, Withdrawn};
+use drive_core::{Class, Control, Direction, Error, StopMode, Withdrawn};
 
 use super::{CALLS, Complaint, OTHER, SETPOINT, SETTLED, Stage};
 use crate::{
@@ -30,6 +30,8 @@ impl Contract {
         complaints.extend(self.what_acts_once_is_written_once().await);
         complaints.extend(self.no_command_is_a_parameter().await);
         complaints.extend(self.reset_is_an_edge().await);
+        complaints.extend(self.a_drive_without_a_trip_is_not_reset().await);
+        complaints.extend(self.somebody_at_the_drive_keeps_what_he_has().await);
         complaints.extend(self.who_asks_is_told_what_a_start_would_be().await);
         complaints.extend(self.forgets().await);
         complaints
@@ -168,6 +170,42 @@ impl Contract {
         stage.complaints
     }
 
+    /// A reset of a drive that has not tripped is none: what resets may do something else there, such as end a run.
+    async fn a_drive_without_a_trip_is_not_reset(&self) -> Vec<Complaint> {
+        let mut stage = self.stage("a drive that has not tripped is left alone by a reset").await;
+        let _ = stage.rig.drive.reset_faults().await;
+        let heard = stage.witness.heard();
+        if heard.iter().any(Heard::writes) {
+            stage.blame(format!("it {}", told(&heard)));
+        }
+        stage.complaints
+    }
+
+    /// A motor that somebody runs at the drive: he is told as the one who has it, and a withdrawal, where no run command of this side stands,
+    /// leaves him his motor.
+    async fn somebody_at_the_drive_keeps_what_he_has(&self) -> Vec<Complaint> {
+        let mut stage = self.stage("what somebody runs at the drive is told as his, and not withdrawn").await;
+        if !stage.run_at_the_drive().await {
+            return stage.complaints;
+        }
+        match stage.rig.drive.status().await {
+            Ok(status) if status.control == Some(Control::Bus) => {
+                let seen = stage.seen();
+                stage.blame(format!("told under the control of the bus: {status}; {seen:?}"));
+            }
+            _ => {}
+        }
+        stage.witness.from_now_on(Habit::Obeys);
+        let withdrawn = stage.rig.drive.withdraw().await;
+        let writes = stage.witness.heard().iter().any(Heard::writes);
+        stage.live(SETTLED).await;
+        if writes || matches!(withdrawn, Ok(Withdrawn::Ended(_))) || !stage.seen().running {
+            let seen = stage.seen();
+            stage.blame(format!("withdrawn, written: {writes}: {withdrawn:?}; {seen:?}"));
+        }
+        stage.complaints
+    }
+
     /// Whether a start would be refused is judged as the start itself judges it, and nothing is written for it.
     async fn who_asks_is_told_what_a_start_would_be(&self) -> Vec<Complaint> {
         let mut stage = self.stage("whether it may start is judged as by the start itself").await;
@@ -281,6 +319,27 @@ impl Stage {
         if heard[last..].iter().any(|heard| !heard.writes() && dies(heard)) {
             self.blame(format!("what judges {what} dies of the lifetime of the order: it {}", told(&heard)));
         }
+    }
+
+    /// Somebody takes the control at the drive, and runs its motor by a key or an input of which the level or the edge counts. False: his machine
+    /// has none.
+    async fn run_at_the_drive(&mut self) -> bool {
+        let around = self.rig.machine.surroundings();
+        let analog = around.analog_inputs.iter().map(|name| format!("analog {name} 60%"));
+        let takes = ["panel takes".to_owned(), "panel reference 25Hz".to_owned()].into_iter().chain(analog);
+        let terminals = around.terminals.iter().map(|name| format!("terminal {name} on"));
+        let runs = iter::once("panel run".to_owned()).chain(terminals);
+        for deed in takes.chain(runs) {
+            let line = format!("{} {deed}", self.rig.machine.name());
+            // What this machine has no part for does not happen.
+            let _ = self.rig.simulated.control(&line);
+            self.live(Duration::from_secs(2)).await;
+            if self.seen().running {
+                self.live(SETTLED).await;
+                return self.seen().running;
+            }
+        }
+        false
     }
 
     /// The registers that are read by a status, a setpoint and a start, in order. What only takes its turn is not among them.
