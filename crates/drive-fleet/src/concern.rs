@@ -74,7 +74,7 @@ macro_rules! table {
 table! {
     /// A stop goes without a confirmation for longer than the settings allow: [`PendingStop::alarm`](crate::PendingStop).
     StopUnconfirmed: "stop_unconfirmed", "STOP NOT CONFIRMED, the motor may turn", Alarm, true,
-        "use the emergency stop, then look at the drive; the stop is repeated";
+        "use the emergency stop, then look at the drive";
     /// Somebody else has control and the run command of this side still stands in the drive.
     RunCommandStands: "run_command_stands", "a run command stands, the motor may start when control is given back", Alarm, true,
         "stop the drive at its panel before control is given back";

@@ -122,7 +122,7 @@ async fn a_snapshot_tells_what_is_known_with_the_age_and_quality_of_each_value()
             "concerns": [{"kind": "stop_unconfirmed", "rank": 0, "severity": "alarm", "wakes": true, "since_ms": 10_120,
                 "text": "STOP NOT CONFIRMED, the motor may turn: ramp stop, sent in 2 attempts",
                 "detail": "ramp stop, sent in 2 attempts",
-                "remedy": "use the emergency stop, then look at the drive; the stop is repeated"}],
+                "remedy": "use the emergency stop, then look at the drive"}],
             "identity": {"check": "same", "model": "ATV312HU15N4", "codes": []},
             "watchdog": {"check": "verified", "time_ms": 10_000, "reaction": "ramp"},
             "counters": {"polls": 0, "answered": 0, "missed": 0, "failures": 0, "lost": 0, "trips": 0, "saves": 0}

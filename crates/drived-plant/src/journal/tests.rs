@@ -175,7 +175,7 @@ async fn the_log_of_a_bad_quarter_of_an_hour_is_read_in_a_minute() {
         (Level::INFO, &["north: identified: all 10 TELEMECANIQUE ATV312HU15N4"]),
         (Level::INFO, &["north: pump 6: start forward by operator: confirmed"]),
         // The terminal that came loose: the first at once, the others together.
-        (Level::WARN, &["pump 7 lost with output off: no answer for "]),
+        (Level::WARN, &["pump 7 lost with output off: no answer for 2.9 s"]),
         (
             Level::ERROR,
             &["north: also lost, no answer for up to ", "pump 3, pump 4, pump 5, pump 6 at 30 Hz"],

@@ -76,7 +76,7 @@ export const SENTENCES_FR = {
   'see what its display says, for its manual does not explain its status word': 'voir son afficheur, car son manuel n’explique pas ce mot d’état',
 
   // What to do about what troubles a drive.
-  'use the emergency stop, then look at the drive; the stop is repeated': 'utiliser l’arrêt d’urgence, puis voir le variateur ; l’arrêt est répété',
+  'use the emergency stop, then look at the drive': 'utiliser l’arrêt d’urgence, puis voir le variateur',
   'stop the drive at its panel before control is given back': 'arrêter le variateur à son terminal avant de rendre la commande',
   'look at the motor, then at the drive\'s supply and its cable': 'voir le moteur, puis l’alimentation du variateur et son câble',
   'see which drive it is and how it is set up, then accept it on its page or by drived accept': 'voir quel variateur c’est et comment il est réglé, puis l’accepter sur sa page ou par drived accept',
