@@ -25,7 +25,7 @@ use drived_doors::{
 use drived_plant::plant::{
     Plant,
     alarms::AlarmsView,
-    commands::{Accept, NewSetpoint, Plain, Release, Reset, Save, Start, Stop},
+    commands::{Accept, NewSetpoint, Release, Reset, Save, Start, Stop},
     history::{CurvesView, HistoryView},
     parameters::{ParameterView, WrittenView},
     past::{
@@ -307,7 +307,7 @@ pub(super) fn setup_routes() -> Vec<Route> {
             "Begins to scan a port; nothing is written by it",
             view,
         ),
-        post::<Plain, SetupView>(setup::CANCEL, "Gives up the scan that is under way", view),
+        post::<setup::Cancel, SetupView>(setup::CANCEL, "Gives up the scan that is under way", view),
         post::<setup::DrivesWanted, SetupChanges>(
             setup::DRIVES,
             "Takes drives up, to be watched, and writes them down",
@@ -513,12 +513,12 @@ fn commands() -> Vec<Route> {
             command::to_drive::<NewSetpoint>,
             "Changes the setpoint of a drive",
         ),
-        Route::command::<_, _, Plain>(
+        Route::command::<_, _, Reset>(
             "/api/v1/drives/{name}/reset",
             command::to_drive::<Reset>,
             "Resets the present fault of a drive",
         ),
-        Route::command::<_, _, Plain>(
+        Route::command::<_, _, Release>(
             "/api/v1/drives/{name}/release",
             command::to_drive::<Release>,
             "Gives control of a drive back to its panel or terminals",
@@ -538,12 +538,12 @@ fn commands() -> Vec<Route> {
             command::to_group::<NewSetpoint>,
             "Changes the setpoint of every drive of a group",
         ),
-        Route::command::<_, _, Plain>(
+        Route::command::<_, _, Reset>(
             "/api/v1/groups/{name}/reset",
             command::to_group::<Reset>,
             "Resets the present faults of a group",
         ),
-        Route::command::<_, _, Plain>(
+        Route::command::<_, _, Release>(
             "/api/v1/groups/{name}/release",
             command::to_group::<Release>,
             "Gives control of a group back to panels or terminals",
@@ -563,17 +563,17 @@ fn commands() -> Vec<Route> {
             command::to_selected::<NewSetpoint>,
             "Changes the setpoint of the drives that are named",
         ),
-        Route::command::<_, _, Selected<Plain>>(
+        Route::command::<_, _, Selected<Reset>>(
             "/api/v1/selected/reset",
             command::to_selected::<Reset>,
             "Resets the present faults of the drives that are named",
         ),
-        Route::command::<_, _, Selected<Plain>>(
+        Route::command::<_, _, Selected<Release>>(
             "/api/v1/selected/release",
             command::to_selected::<Release>,
             "Gives control of the drives that are named back to panels or terminals",
         ),
-        Route::command::<_, _, Plain>(
+        Route::command::<_, _, Save>(
             "/api/v1/drives/{name}/save",
             command::to_drive::<Save>,
             "Saves the parameters of a drive to its EEPROM",

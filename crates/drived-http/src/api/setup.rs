@@ -174,6 +174,10 @@ pub struct AddedView {
     pub control: bool,
 }
 
+/// That the scan is given up: nothing more is to be said.
+#[derive(Debug, JsonSchema)]
+pub struct Cancel {}
+
 /// A scan that is wished for.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

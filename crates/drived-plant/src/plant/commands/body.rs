@@ -76,26 +76,86 @@ pub fn is_id(text: &str) -> bool {
     (1..=LONGEST_ID).contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_graphic())
 }
 
-/// Starts the motor.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Start {
-    /// The caller's name of the command: one that comes again within ten minutes is answered, and not repeated.
-    #[schemars(length(min = 1, max = LONGEST_ID))]
-    id: Option<String>,
-    /// After this time from its arrival nothing of it is sent any more; unless it is said, it begins within 1000, and ends 2000 later.
-    #[schemars(range(min = 1, max = 10_000))]
-    expires_in_ms: Option<u64>,
-    /// When it was issued, by a clock that agrees with the daemon's: its time counts from then, and a stop since then goes before it.
-    issued_unix_ms: Option<u64>,
-    /// What was shown of the drives: it is carried out so, or refused.
-    expects: Option<Expects>,
-    /// `forward` unless it is said.
-    direction: Option<Direction>,
-    /// Given first; without it the motor starts at what the drive holds.
-    setpoint: Option<Setpoint>,
-    /// When it is confirmed; `in_force` unless it is said.
-    until: Option<Until>,
+/// A body with what every command may say beside its own members, and the action that it asks for.
+macro_rules! body {
+    (
+        $(#[$about:meta])*
+        $name:ident { $($(#[$of:meta])* $member:ident: $kind:ty,)* } asks $action:expr
+    ) => {
+        $(#[$about])*
+        #[derive(Debug, Deserialize, JsonSchema)]
+        #[serde(deny_unknown_fields)]
+        pub struct $name {
+            /// The caller's name of the command: one that comes again within ten minutes is answered, and not repeated.
+            #[schemars(length(min = 1, max = LONGEST_ID))]
+            id: Option<String>,
+            /// After this time from its arrival nothing of it is sent any more; unless it is said, after 1000, and of a start that has begun
+            /// by then after 2000 more.
+            #[schemars(range(min = 1, max = 10_000))]
+            expires_in_ms: Option<u64>,
+            /// When it was issued, by a clock that agrees with the daemon's: its time counts from then, and a stop since then goes before it.
+            issued_unix_ms: Option<u64>,
+            /// What was shown of the drives: it is carried out so, or refused.
+            expects: Option<Expects>,
+            $($(#[$of])* $member: $kind,)*
+        }
+
+        impl Asks for $name {
+            fn asked(self) -> Asked {
+                let Self { id, expires_in_ms, issued_unix_ms, expects, $($member),* } = self;
+                Asked { id, expires_in_ms, issued_unix_ms, expects, action: $action }
+            }
+        }
+    };
+}
+
+body! {
+    /// Starts the motor.
+    Start {
+        /// `forward` unless it is said.
+        direction: Option<Direction>,
+        /// Given first; without it the motor starts at what the drive holds.
+        setpoint: Option<Setpoint>,
+        /// When it is confirmed; `in_force` unless it is said.
+        until: Option<Until>,
+    } asks Action::Start {
+        direction: direction.unwrap_or(Direction::Forward),
+        setpoint,
+        until: until.unwrap_or_default(),
+    }
+}
+
+body! {
+    /// Changes the setpoint.
+    NewSetpoint {
+        setpoint: Setpoint,
+        /// When it is confirmed; `in_force` unless it is said.
+        until: Option<Until>,
+    } asks Action::Setpoint { setpoint, until: until.unwrap_or_default() }
+}
+
+body! {
+    /// Resets the present fault, once.
+    Reset {} asks Action::Reset
+}
+
+body! {
+    /// Saves the parameters to EEPROM.
+    Save {} asks Action::Save
+}
+
+body! {
+    /// Gives control back to the panel or the terminals.
+    Release {} asks Action::Release
+}
+
+body! {
+    /// Takes what a drive says it is for right, where that is another one than before. Nothing is sent to it.
+    Accept {
+        /// What the drive says that it is, as the `identity` of its state has shown it: where it says something else by now, that is refused
+        /// with the reason `not_as_shown`. What stands there besides, such as the `check`, is not looked at.
+        identity: Identity,
+    } asks Action::Accept((&identity).into())
 }
 
 /// Stops the motor. It never expires, and is carried out each time it arrives, whatever else its body says.
@@ -113,123 +173,4 @@ pub struct Stop {
     /// is said, as the drive's configuration does.
     #[schemars(range(min = 1, max = 30_000))]
     injection_ms: Option<u64>,
-}
-
-/// Changes the setpoint.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct NewSetpoint {
-    /// The caller's name of the command: one that comes again within ten minutes is answered, and not repeated.
-    #[schemars(length(min = 1, max = LONGEST_ID))]
-    id: Option<String>,
-    /// After this time from its arrival it is not sent any more; 1000 unless it is said.
-    #[schemars(range(min = 1, max = 10_000))]
-    expires_in_ms: Option<u64>,
-    /// When it was issued, by a clock that agrees with the daemon's: its time counts from then, and a stop since then goes before it.
-    issued_unix_ms: Option<u64>,
-    /// What was shown of the drives: it is carried out so, or refused.
-    expects: Option<Expects>,
-    setpoint: Setpoint,
-    /// When it is confirmed; `in_force` unless it is said.
-    until: Option<Until>,
-}
-
-/// A command that has nothing to say about itself.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Plain {
-    /// The caller's name of the command: one that comes again within ten minutes is answered, and not repeated.
-    #[schemars(length(min = 1, max = LONGEST_ID))]
-    id: Option<String>,
-    /// After this time from its arrival it is not sent any more; 1000 unless it is said.
-    #[schemars(range(min = 1, max = 10_000))]
-    expires_in_ms: Option<u64>,
-    /// When it was issued, by a clock that agrees with the daemon's: its time counts from then, and a stop since then goes before it.
-    issued_unix_ms: Option<u64>,
-    /// What was shown of the drives: it is carried out so, or refused.
-    expects: Option<Expects>,
-}
-
-/// Resets the present fault, once.
-#[derive(Debug, Deserialize)]
-#[serde(transparent)]
-pub struct Reset(Plain);
-
-/// Saves the parameters to EEPROM.
-#[derive(Debug, Deserialize)]
-#[serde(transparent)]
-pub struct Save(Plain);
-
-/// Gives control back to the panel or the terminals.
-#[derive(Debug, Deserialize)]
-#[serde(transparent)]
-pub struct Release(Plain);
-
-/// Takes what a drive says it is for right, where that is another one than before. Nothing is sent to it.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Accept {
-    /// The caller's name of the command: one that comes again within ten minutes is answered, and not repeated.
-    #[schemars(length(min = 1, max = LONGEST_ID))]
-    id: Option<String>,
-    /// After this time from its arrival it is not done any more; 1000 unless it is said.
-    #[schemars(range(min = 1, max = 10_000))]
-    expires_in_ms: Option<u64>,
-    /// When it was issued, by a clock that agrees with the daemon's: its time counts from then, and a stop since then goes before it.
-    issued_unix_ms: Option<u64>,
-    /// What was shown of the drives: it is carried out so, or refused.
-    expects: Option<Expects>,
-    /// What the drive says that it is, as the `identity` of its state has shown it: where it says something else by now, that is refused
-    /// with the reason `not_as_shown`. What stands there besides, such as the `check`, is not looked at.
-    identity: Identity,
-}
-
-impl Asks for Accept {
-    fn asked(self) -> Asked {
-        let Self { id, expires_in_ms, issued_unix_ms, expects, identity } = self;
-        let action = Action::Accept((&identity).into());
-        Asked { id, expires_in_ms, issued_unix_ms, expects, action }
-    }
-}
-
-impl Asks for Start {
-    fn asked(self) -> Asked {
-        let Self { id, expires_in_ms, issued_unix_ms, expects, direction, setpoint, until } = self;
-        let (direction, until) = (direction.unwrap_or(Direction::Forward), until.unwrap_or_default());
-        let action = Action::Start { direction, setpoint, until };
-        Asked { id, expires_in_ms, issued_unix_ms, expects, action }
-    }
-}
-
-impl Asks for NewSetpoint {
-    fn asked(self) -> Asked {
-        let Self { id, expires_in_ms, issued_unix_ms, expects, setpoint, until } = self;
-        let action = Action::Setpoint { setpoint, until: until.unwrap_or_default() };
-        Asked { id, expires_in_ms, issued_unix_ms, expects, action }
-    }
-}
-
-impl Asks for Reset {
-    fn asked(self) -> Asked {
-        self.0.asked_to(Action::Reset)
-    }
-}
-
-impl Asks for Release {
-    fn asked(self) -> Asked {
-        self.0.asked_to(Action::Release)
-    }
-}
-
-impl Asks for Save {
-    fn asked(self) -> Asked {
-        self.0.asked_to(Action::Save)
-    }
-}
-
-impl Plain {
-    fn asked_to(self, action: Action) -> Asked {
-        let Self { id, expires_in_ms, issued_unix_ms, expects } = self;
-        Asked { id, expires_in_ms, issued_unix_ms, expects, action }
-    }
 }

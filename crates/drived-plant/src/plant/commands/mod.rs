@@ -29,7 +29,7 @@ use tokio::{
 
 pub(super) use self::log::Log;
 pub use self::{
-    body::{Accept, Asked, Asks, NewSetpoint, Plain, Release, Reset, Save, Start, Stop, is_id},
+    body::{Accept, Asked, Asks, NewSetpoint, Release, Reset, Save, Start, Stop, is_id},
     expected::{Expects, Otherwise},
     log::Told,
     outcome::OutcomeWord,
