@@ -235,9 +235,18 @@ impl Plant {
         run(&["reload", "--socket", &self.at("socket")]).assert_done();
     }
 
-    /// Registers of a unit, by somebody who speaks Modbus TCP; `None`: it does not answer.
+    /// Registers of a unit, by somebody who speaks Modbus TCP; `None`: it does not answer. A gateway of which a reload has changed the units
+    /// is opened anew: for a moment nobody listens.
     fn words(&self, unit: u8, address: u16, count: u16) -> Option<Vec<u16>> {
-        let mut stream = TcpStream::connect(("127.0.0.1", self.gateway)).expect("it listens");
+        let end = Instant::now() + PATIENCE;
+        let connect = || TcpStream::connect(("127.0.0.1", self.gateway));
+        let mut stream = loop {
+            match connect() {
+                Ok(stream) => break stream,
+                Err(error) => assert!(Instant::now() < end, "{error}"),
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
         stream.set_read_timeout(Some(PATIENCE)).expect("it does not wait for ever");
         let [high, low] = address.to_be_bytes();
         stream.write_all(&[0, 1, 0, 0, 0, 6, unit, 3, high, low, 0, count as u8]).expect("it reads");
