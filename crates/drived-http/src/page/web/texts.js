@@ -205,7 +205,7 @@ const TABLE = {
   forbidden_now: ['{value} is forbidden here.', '{value} est interdit ici.'],
   only_read_long: ['This drive is only read: its configuration does not say control = true.', 'Ce variateur est seulement lu : sa configuration ne dit pas control = true.'],
   may_not_command: ['To command this drive, log in with a token that is for it.', 'Pour commander ce variateur, identifiez-vous avec un jeton qui vaut pour lui.'],
-  start_refused: ['A start would be refused now: {why}', 'Un démarrage serait refusé à présent : {why}'],
+  start_refused: ['A start would be refused now: {why}.', 'Un démarrage serait refusé à présent : {why}.'],
   confirm_start: ['{drive}: start {direction}? The motor will turn.', '{drive} : démarrer {direction} ? Le moteur va tourner.'],
   confirm_start_at: ['{drive}: start {direction} at {setpoint}? The motor will turn.', '{drive} : démarrer {direction} à {setpoint} ? Le moteur va tourner.'],
   withdrawn_by_stop: ['question closed, a stop came meanwhile. Ask again if it is wanted still.', 'question fermée, un arrêt est arrivé entre-temps. Redemandez si cela reste voulu.'],
