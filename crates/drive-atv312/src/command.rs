@@ -375,12 +375,15 @@ impl<P: Port> Drivecom for Atv312<P> {
         }
         // A drive that has no LAC never tells them, however often it is asked.
         while !self.known.settings.knows_stop() && !self.known.settings.is_complete() {
-            self.read_setting(Class::Command).await.ok()?;
+            if self.read_setting(Class::Command).await.is_err() {
+                return (led != before).then_some(sent);
+            }
             // Until the bit is known that leads the command to the bus, a stop of the bus may have left the motor to the terminals.
             let kept = self.known.settings.kept(self.high_bits);
             if kept != led {
                 led = kept;
-                self.write_control(Class::Stop, sent.word, Effect::Level).await.ok()?;
+                // It is written once more when all is known, and that one's outcome counts.
+                let _ = self.write_control(Class::Stop, sent.word, Effect::Level).await;
             }
         }
         // A quick stop that went out while nothing was known is not turned into a slower one.
