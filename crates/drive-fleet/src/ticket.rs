@@ -26,8 +26,9 @@ use crate::{
 /// - What is unsent of it never is.
 /// - A start whose run command was sent, or may have been, is taken back by a stop along the ramp, which is repeated until it is
 ///   confirmed, also where the motor ran before: so nothing runs by a start that nobody has heard of. It is not where
-///   somebody else has started or stopped the motor since.
-/// - A setpoint that was sent stays. A reset, a release and a save that are under way are finished: they are edges, and half of one
+///   somebody else has started or stopped the motor since. So is one of which no more than the setpoint was sent, or may have been,
+///   where the motor ran by this side: it goes to that setpoint.
+/// - A setpoint that was given by itself stays. A reset, a release and a save that are under way are finished: they are edges, and half of one
 ///   would stand in the drive.
 ///
 /// Once its outcome was heard, dropping it does nothing.

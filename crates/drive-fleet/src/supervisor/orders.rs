@@ -71,6 +71,12 @@ impl Active {
         self.asker.cause()
     }
 
+    /// Whether its setpoint is on the wire, or was, and nothing is known of it yet.
+    const fn is_at_setpoint(&self) -> bool {
+        let (Phase::Sending(job) | Phase::Verifying { job, .. }) = &self.phase else { return false };
+        matches!(job, Job::SetSetpoint(..))
+    }
+
     /// How it ends when something comes in between.
     pub(super) fn ended_by(&self, unsent: Refused, sent: Unconfirmed) -> Outcome {
         match &self.phase {
@@ -129,21 +135,28 @@ impl Supervisor {
             let ours = self.lease.is_some() || self.is_starting();
             return ours && self.started_by == Some(id) && self.take_back(now);
         };
+        // A motor that runs already goes to the setpoint of a start, before that is sent or without it.
+        let moves = matches!(active.order, Order::Start { .. })
+            && self.lease.is_some()
+            && (active.setpoint_given.is_some() || active.is_at_setpoint());
         match active.phase {
             Phase::Prepare => {
                 self.end_active(Refused::Withdrawn, Unconfirmed::Withdrawn);
-                false
+                moves && self.take_back(now)
             }
             Phase::Sending(Job::SetSetpoint(..)) => {
                 // It may stand in the drive or not: a later start must not count on it.
                 self.given = None;
                 self.end_active(Refused::Withdrawn, Unconfirmed::Withdrawn);
+                if moves {
+                    self.take_back(now);
+                }
                 true
             }
             _ if self.started_by == Some(id) => self.take_back(now),
             Phase::Verifying { job: Job::SetSetpoint(..), .. } => {
                 self.end_active(Refused::Withdrawn, Unconfirmed::Withdrawn);
-                false
+                moves && self.take_back(now)
             }
             // An edge is not left half done.
             Phase::Sending(_) | Phase::Verifying { .. } | Phase::Awaiting { .. } => false,

@@ -67,6 +67,33 @@ fn a_start_that_is_withdrawn_while_its_run_command_is_sent_is_taken_back() {
     assert!(matches!(rig.drive.writes().first(), Some(Job::Stop(_))), "{:?}", rig.drive.writes());
 }
 
+/// "So is one of which no more than the setpoint was sent, or may have been, where the motor ran by this side: it goes to that setpoint."
+#[test]
+fn a_start_that_is_withdrawn_behind_its_setpoint_is_taken_back_where_the_motor_runs_and_not_where_it_stands() {
+    for (runs, answered) in [(true, false), (true, true), (false, false), (false, true)] {
+        let mut rig = Rig::ready();
+        if runs {
+            rig.order(START);
+            rig.pass(3_000 * MS);
+            assert!(rig.snapshot().started_here());
+            rig.drive.log.clear();
+        }
+        let id = rig.order(run_at(45));
+        let job = rig.begins();
+        assert!(matches!(job, Job::SetSetpoint(..)), "{job:?}");
+        if answered {
+            let reply = rig.drive.answer(job);
+            rig.machine.handle_reply(rig.now, reply);
+        }
+        rig.withdraw(id);
+        rig.pass(1_000 * MS);
+        let writes = rig.drive.writes();
+        let stops = writes.iter().any(|job| matches!(job, Job::Stop(_)));
+        assert_eq!(stops, runs, "runs: {runs}, answered: {answered}: {writes:?}");
+        assert!(!writes.iter().any(|job| matches!(job, Job::Start(_))), "{writes:?}");
+    }
+}
+
 #[test]
 fn a_setpoint_that_is_withdrawn_while_it_is_sent_is_one_that_nobody_knows() {
     let mut rig = Rig::ready();
