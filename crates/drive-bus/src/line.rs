@@ -20,7 +20,7 @@ use crate::{
     slave::Slave,
     stats::Stats,
     task::Task,
-    transport::{BoxedStream, Connector, Given, OpenError},
+    transport::{BoxedStream, Connector, Given, Guarded, OpenError, begin},
 };
 
 /// One line and the task that owns its port. Cheap to clone; when the last handle ([`Line`] or [`Slave`]) is gone, the
@@ -77,13 +77,14 @@ impl Line {
     }
 
     /// A line over a stream that the caller brings: one end of a `tokio::io::duplex`, a pty, a socket. When the stream
-    /// ends the line is down for good.
+    /// ends, or panics, the line is down for good.
     #[must_use]
     pub fn over(stream: impl AsyncRead + AsyncWrite + Send + Unpin + 'static, config: LineConfig) -> Self {
-        Self::spawn(config, Connector::None, Some(Box::new(stream)), Sleeps::new())
+        Self::spawn(config, Connector::None, Some(Box::new(Guarded(stream))), Sleeps::new())
     }
 
-    /// A line over streams that `open` makes: called at once and again whenever the stream has ended.
+    /// A line over streams that `open` makes: called at once and again whenever the stream has ended. One that panics has ended so; an
+    /// opening that panics, or takes longer than 30 s, has failed.
     #[must_use]
     pub fn over_reopened<S, F>(open: impl FnMut() -> F + Send + 'static, config: LineConfig) -> Self
     where
@@ -105,10 +106,7 @@ impl Line {
         S: AsyncRead + AsyncWrite + Send + Unpin + 'static,
         F: Future<Output = io::Result<S>> + Send + 'static,
     {
-        let given: Given = Box::new(move || {
-            let stream = open();
-            Box::pin(async move { stream.await.map(|stream| Box::new(stream) as BoxedStream) })
-        });
+        let given: Given = Box::new(move || begin(&mut open));
         Self::spawn(config, Connector::Given(given), None, sleeps)
     }
 

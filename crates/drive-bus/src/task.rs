@@ -244,7 +244,7 @@ impl Task {
                 self.received_second.resize(self.received.len(), 0);
             }
             Some(SecondPort::Close) => {
-                if let Connection::Open(stream) = &self.second {
+                if let Connection::Open(stream) = &mut self.second {
                     reset_when_dropped(stream);
                 }
                 self.second = Connection::Gone;
@@ -339,7 +339,7 @@ impl Task {
 
     /// The port is mute: whatever lies in it, and in the one at its far end, goes with it.
     fn leave(&mut self, reason: &str) {
-        if let Connection::Open(stream) = &self.port {
+        if let Connection::Open(stream) = &mut self.port {
             reset_when_dropped(stream);
         }
         self.lose(reason);

@@ -7,7 +7,10 @@ mod support;
 
 use std::{
     future::ready,
+    io,
+    pin::Pin,
     sync::atomic::{AtomicU64, Ordering},
+    task::{Context, Poll},
     time::Duration,
 };
 
@@ -16,7 +19,10 @@ use drive_clock::Sleeps;
 use drive_core::{Class, PortError, SerialSettings, Terms};
 use drive_sim::{Gateway, GatewayInMemory, SimLine, SimSlave, Wiring, models::atv312::Atv312};
 use support::{MS, read, write};
-use tokio::time::{Instant, sleep};
+use tokio::{
+    io::{AsyncRead, AsyncWrite, ReadBuf},
+    time::{Instant, sleep},
+};
 
 const SECOND: Duration = Duration::from_secs(1);
 /// The acceleration ramp, which can be set to anything.
@@ -187,5 +193,85 @@ async fn a_computer_that_slept_has_lost_its_line_and_takes_nothing_that_lay_in_i
         // Only once.
         assert_eq!(ramp(&plant.line, 1, 3).await, Ok(200));
         assert_eq!(plant.line.stats().opened, 2);
+    }
+}
+
+/// How somebody's stream, or his opening of it, ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Evil {
+    PanicsReading,
+    PanicsWriting,
+    PanicsOpening,
+    PanicsAtOnce,
+    OpensNever,
+}
+
+/// A stream of somebody else's, which may panic.
+struct Theirs<S> {
+    stream: S,
+    evil: Option<Evil>,
+}
+
+impl<S: AsyncRead + Unpin> AsyncRead for Theirs<S> {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        assert_ne!(self.evil, Some(Evil::PanicsReading), "no");
+        Pin::new(&mut self.stream).poll_read(context, buffer)
+    }
+}
+
+impl<S: AsyncWrite + Unpin> AsyncWrite for Theirs<S> {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        assert_ne!(self.evil, Some(Evil::PanicsWriting), "no");
+        Pin::new(&mut self.stream).poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+}
+
+/// `over_reopened`: "One that panics has ended so; an opening that panics, or takes longer than 30 s, has failed."
+#[tokio::test(start_paused = true)]
+async fn a_stream_of_somebody_elses_that_panics_or_is_never_opened_is_a_port_that_is_lost_and_opened_again() {
+    use Evil::{OpensNever, PanicsAtOnce, PanicsOpening, PanicsReading, PanicsWriting};
+    for evil in [PanicsReading, PanicsWriting, PanicsOpening, PanicsAtOnce, OpensNever] {
+        let simulated = SimLine::new(Wiring::rtu(SerialSettings::MODBUS_DEFAULT));
+        let drive = simulated.add(1, Atv312::new()).expect("the address is free");
+        assert!(drive.poke(ACC, 77));
+        let mut left = 1;
+        let open = move || {
+            let evil = (std::mem::take(&mut left) > 0).then_some(evil);
+            assert_ne!(evil, Some(PanicsAtOnce), "no");
+            let stream = simulated.in_memory();
+            async move {
+                assert_ne!(evil, Some(PanicsOpening), "no");
+                if evil == Some(OpensNever) {
+                    std::future::pending::<()>().await;
+                }
+                Ok(Theirs { stream, evil })
+            }
+        };
+        let line = Line::over_reopened(open, LineConfig::stream(SerialSettings::MODBUS_DEFAULT));
+        let begun = Instant::now();
+        let told = loop {
+            match ramp(&line, 1, 0).await {
+                Ok(told) => break told,
+                Err(error) => assert!(begun.elapsed() < 60 * SECOND, "{evil:?}: {error}"),
+            }
+            sleep(100 * MS).await;
+        };
+        assert_eq!(told, 77, "{evil:?}");
     }
 }

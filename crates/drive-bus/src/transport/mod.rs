@@ -1,5 +1,6 @@
 //! Ways to the line: what can be opened, and what is read and written.
 
+mod given;
 #[cfg(feature = "serial")]
 mod low_latency;
 #[cfg(feature = "serial")]
@@ -7,6 +8,7 @@ mod serial;
 #[cfg(feature = "tcp")]
 mod tcp;
 
+pub(crate) use given::{Guarded, begin};
 #[cfg(feature = "serial")]
 pub use low_latency::adapter_latency;
 
@@ -42,7 +44,7 @@ pub(crate) fn poll_read_now(
     buffer: &mut [u8],
 ) -> Poll<io::Result<usize>> {
     #[cfg(feature = "serial")]
-    if let Some(port) = (stream as &mut dyn Any).downcast_mut::<tokio_serial::SerialStream>() {
+    if let Some(port) = of_kind::<tokio_serial::SerialStream>(stream) {
         return match port.try_read(buffer) {
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => Poll::Pending,
             read => Poll::Ready(read),
@@ -53,13 +55,23 @@ pub(crate) fn poll_read_now(
 }
 
 /// A connection is to end with a reset, not with what may still be on its way.
-pub(crate) fn reset_when_dropped(stream: &BoxedStream) {
+pub(crate) fn reset_when_dropped(stream: &mut BoxedStream) {
     #[cfg(feature = "tcp")]
-    if let Some(stream) = (stream.as_ref() as &dyn Any).downcast_ref::<tokio::net::TcpStream>() {
+    if let Some(stream) = of_kind::<tokio::net::TcpStream>(stream.as_mut()) {
         tcp::reset_when_dropped(stream);
     }
     #[cfg(not(feature = "tcp"))]
     let _ = stream;
+}
+
+/// The stream of this kind that it is, whoever has made it.
+#[cfg(any(feature = "serial", feature = "tcp"))]
+fn of_kind<T: 'static>(stream: &mut dyn Stream) -> Option<&mut T> {
+    let any: &mut dyn Any = stream;
+    if any.is::<T>() {
+        return any.downcast_mut();
+    }
+    any.downcast_mut().map(|Guarded(stream)| stream)
 }
 
 /// Why a line could not be opened.

@@ -69,7 +69,8 @@ fn a_start_that_is_withdrawn_while_its_run_command_is_sent_is_taken_back() {
 
 /// "So is one of which no more than the setpoint was sent, or may have been, where the motor ran by this side: it goes to that setpoint."
 #[test]
-fn a_start_that_is_withdrawn_behind_its_setpoint_is_taken_back_where_the_motor_runs_and_not_where_it_stands() {
+fn a_start_that_is_withdrawn_behind_its_setpoint_is_taken_back_where_the_motor_runs_and_not_where_it_stands()
+{
     for (runs, answered) in [(true, false), (true, true), (false, false), (false, true)] {
         let mut rig = Rig::ready();
         if runs {
