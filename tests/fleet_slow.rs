@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_bus::Protocol;
+use drive_bus::{Protocol, SlaveSettings};
 use drive_core::{Direction, Frequency, StopMode};
 use drive_families::Family;
 use drive_fleet::{Order, Periods, Until};
@@ -10,7 +10,7 @@ use drive_sim::{Exception, Fault, SimSlave};
 use drive_testing::rig::Rig;
 use support::{
     drives,
-    plant::{Plant, Site, common_settings, controlled},
+    plant::{ADDRESS, Plant, Site, common_settings, controlled},
 };
 use tokio::time::{Instant, sleep, timeout};
 
@@ -178,5 +178,53 @@ async fn no_run_word_goes_to_a_slow_drive_behind_the_time_that_its_start_has_sai
         // Whoever says no time has it started: what is begun in its second has two more.
         let outcome = drive.run(Direction::Forward, Frequency::from_hertz(20)).await;
         assert!(outcome.is_confirmed(), "{family}: {outcome}");
+    }
+}
+
+/// README, promise 2: "A command that could not be sent within its lifetime (1 s by default) is never sent at all." Only a start that has begun
+/// goes on.
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_and_a_reset_of_a_slow_drive_are_written_in_their_second_or_never() {
+    for (family, answers_after) in
+        Family::BUILT_IN.into_iter().flat_map(|family| [60, 180, 300, 450].map(|after| (family, after)))
+    {
+        for resets in [false, true] {
+            let seldom = 30_000 * MS;
+            let periods =
+                Periods { running: seldom, rest: seldom, slow: Duration::ZERO, max_age: 4 * seldom };
+            let plant = Plant::single(family, |settings| {
+                (settings.watchdog, settings.periods) = (None, periods);
+            });
+            let (drive, machine) = (plant.motor(), plant.machine());
+            let turnaround = family.capabilities().turnaround;
+            let patient =
+                SlaveSettings { response_timeout: Some(2_000 * MS), turnaround, ..SlaveSettings::default() };
+            plant.lines[0].configure_slave(ADDRESS, patient);
+            drive.ready(BOUND).await.unwrap_or_else(|refused| panic!("{family}: {refused}"));
+            if resets {
+                machine.trip(drives::a_trip(family));
+                let tripped = drive.wait_until(|snapshot| snapshot.present_trip().is_some());
+                assert!(timeout(BOUND, tripped).await.is_ok(), "{family}");
+            }
+            machine.set_turnaround(Some(answers_after * MS));
+            sleep(5_000 * MS).await;
+            let begun = Instant::now();
+            let order = if resets {
+                Order::ResetFaults
+            } else {
+                Order::Setpoint { setpoint: Frequency::from_hertz(20).into(), until: Until::InForce }
+            };
+            let outcome = drive.order(order).await;
+            sleep(5_000 * MS).await;
+            let writes = |request: &drive_sim::Received| matches!(request.pdu.first(), Some(6 | 16));
+            let written =
+                machine.received().into_iter().filter(|request| request.at > begun && writes(request));
+            let first = written.map(|request| request.at - begun).min();
+            // The last bit is on the wire a frame behind the first.
+            assert!(
+                first.is_none_or(|at| at <= 1_020 * MS),
+                "{family}, answers after {answers_after} ms, reset: {resets}: {first:?}, {outcome}"
+            );
+        }
     }
 }

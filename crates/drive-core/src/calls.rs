@@ -10,7 +10,7 @@ use crate::{
     access::{Readable, Writable},
     address::SlaveAddress,
     capabilities::Capabilities,
-    confirm::{CONFIRMED_WITHIN, Confirming},
+    confirm::{CONFIRMED_WITHIN, Confirming, later},
     error::{BUSY, Error, ErrorKind, ExceptionMeaning, Exchange, Result},
     identity::Identity,
     kept_readings::KeptReadings,
@@ -48,6 +48,9 @@ pub struct Lifetimes {
     /// When nothing more of a command is sent, however quickly each call of it was: a drive that takes long to answer makes the next one
     /// late. Never by default.
     pub command_until: Option<Instant>,
+    /// When a command of which nothing was written is not sent any more, for one whose further words belong to the first: an edge that has
+    /// risen is to fall. Never by default.
+    pub begun_until: Option<Instant>,
     /// Keep-alives.
     pub keep_alive: Option<Duration>,
     /// Status polls; a daemon sets its poll period.
@@ -79,6 +82,7 @@ impl Default for Lifetimes {
             stop: None,
             command: Some(Duration::from_secs(1)),
             command_until: None,
+            begun_until: None,
             keep_alive: None,
             status: None,
             background: None,
@@ -102,6 +106,8 @@ pub struct Registers<P> {
     begun: Option<Instant>,
     /// Until then what is read as a command judges an order that was written.
     judged_until: Option<Instant>,
+    /// Something of the order was written, or may have been.
+    written: bool,
     /// How long calls may wait.
     pub lifetimes: Lifetimes,
     /// What long jobs have read that were cut.
@@ -136,6 +142,7 @@ impl<P: Port> Registers<P> {
             oldest: None,
             begun: None,
             judged_until: None,
+            written: false,
             lifetimes,
             kept,
             follower: None,
@@ -183,7 +190,7 @@ impl<P: Port> Registers<P> {
     /// somebody else's that comes meanwhile, see [`Terms::begun`]. **Whatever writes in the class of commands begins an order**, or it
     /// is taken for a part of the one before.
     pub fn begin_order(&mut self) {
-        self.judged_until = None;
+        (self.judged_until, self.written) = (None, false);
         self.begun = Some(Instant::now());
     }
 
@@ -203,7 +210,9 @@ impl<P: Port> Registers<P> {
 
     /// A call that dies is sent in the time of its command, too.
     fn bounded(&self, terms: Terms) -> Terms {
-        let until = self.lifetimes.command_until.filter(|_| terms.class == Class::Command);
+        let begun_until = self.lifetimes.begun_until.filter(|_| !self.written);
+        let until = [self.lifetimes.command_until, begun_until].into_iter().flatten().min();
+        let until = until.filter(|_| terms.class == Class::Command);
         let left = until.map(|until| until.saturating_duration_since(Instant::now()));
         let lifetime = terms.lifetime.map(|lifetime| left.map_or(lifetime, |left| lifetime.min(left)));
         Terms { lifetime, ..terms }
@@ -540,7 +549,10 @@ impl<P: Port> Calls<'_, P> {
         );
         let terms =
             if reads { self.registers.patience(self.terms) } else { self.registers.bounded(self.terms) };
-        self.request_under(terms, request, exchange).await
+        let outcome = self.request_under(terms, request, exchange).await;
+        let is_sent = outcome.as_ref().err().is_none_or(|error| error.kind() != ErrorKind::NotSent);
+        self.registers.written |= exchange.is_write() && is_sent;
+        outcome
     }
 
     async fn request_under(
@@ -550,7 +562,7 @@ impl<P: Port> Calls<'_, P> {
         exchange: Exchange,
     ) -> Result<Response> {
         let patience = terms.lifetime.unwrap_or(PATIENCE);
-        let until = Instant::now() + patience;
+        let until = later(Instant::now(), patience);
         let mut asking = Confirming::within(patience);
         loop {
             let outcome = self.once(terms, request.clone(), exchange).await;
@@ -724,6 +736,39 @@ mod tests {
             assert_eq!(error.kind(), ErrorKind::Exception, "{error}");
             assert!(begun.elapsed() <= Duration::from_secs(1), "{:?}", begun.elapsed());
             assert!((least..=most).contains(&busy.port.writes), "{}", busy.port.writes);
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_call_may_wait_for_longer_than_any_clock_goes() {
+        let mut registers = registers([ExceptionCode::ServerDeviceBusy; 3], 0);
+        registers.lifetimes.stop = Some(Duration::MAX);
+        registers.lifetimes.command = Some(Duration::MAX);
+        for (class, word) in [(Class::Stop, 2), (Class::Command, 15)] {
+            assert_eq!(registers.at(class).write(CMD, word).await, Ok(()), "{class}");
+            assert_eq!(registers.port.held, word);
+        }
+    }
+
+    /// What an order is read for and its first word die with it; what belongs to that word goes out whatever it takes.
+    #[tokio::test(start_paused = true)]
+    async fn a_command_that_has_not_begun_in_time_is_not_written_and_one_that_has_is_finished() {
+        for (begins, is_sent) in [(false, false), (true, true)] {
+            let mut registers = registers([], 0);
+            registers.begin_order();
+            registers.lifetimes.begun_until = Some(Instant::now() + Duration::from_millis(100));
+            if begins {
+                assert_eq!(registers.at(Class::Command).write(CMD, 0x80).await, Ok(()));
+            }
+            tokio::time::sleep(Duration::from_millis(200)).await;
+            let terms = registers
+                .bounded(Terms { lifetime: Some(Duration::from_secs(1)), ..Terms::of(Class::Command) });
+            assert_eq!(terms.lifetime != Some(Duration::ZERO), is_sent, "{terms:?}");
+            registers.begin_order();
+            registers.lifetimes.begun_until = None;
+            let terms = registers
+                .bounded(Terms { lifetime: Some(Duration::from_secs(1)), ..Terms::of(Class::Command) });
+            assert_eq!(terms.lifetime, Some(Duration::from_secs(1)));
         }
     }
 

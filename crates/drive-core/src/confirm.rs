@@ -43,6 +43,13 @@ pub struct Confirming {
     pause: Duration,
 }
 
+/// A moment so much later: where that is longer than any clock goes, in thirty years.
+#[must_use]
+pub fn later(at: Instant, time: Duration) -> Instant {
+    const NEVER: Duration = Duration::from_secs(30 * 365 * 24 * 3_600);
+    at.checked_add(time.min(NEVER)).unwrap_or(at)
+}
+
 impl Confirming {
     /// The usual time, from now on.
     #[must_use]
@@ -53,7 +60,7 @@ impl Confirming {
     /// A time of its own, from now on: for what the drive is known to take longer for.
     #[must_use]
     pub fn within(time: Duration) -> Self {
-        Self { until: Instant::now() + time, pause: PAUSE.0 }
+        Self { until: later(Instant::now(), time), pause: PAUSE.0 }
     }
 
     /// Waits until the drive is worth another reading. False: the time is over. At least one reading is always worth it

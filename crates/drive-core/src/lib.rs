@@ -59,7 +59,7 @@ pub use calls::{Calls, Lifetimes, Registers};
 pub use capabilities::{
     AnswerDelay, Capabilities, LineMismatch, Reaction, StatusBit, Watchdog, WatchdogCapability,
 };
-pub use confirm::{CONFIRMED_WITHIN, Confirming, SETTLED_WITHIN};
+pub use confirm::{CONFIRMED_WITHIN, Confirming, SETTLED_WITHIN, later};
 pub use drive::{BroadcastWrite, Drive};
 pub use error::{Error, ErrorKind, ExceptionMeaning, Exchange, NEGATIVE_REPLY, Result, SetpointProblem};
 pub use faults::{Fault, FaultEntry, Faults};

@@ -7,7 +7,9 @@ use std::{
     time::Duration,
 };
 
-use drive_core::{Class, Direction, Drive, Error, Follower, Ground, Lease, Lifetimes, Refusal, Setpoint};
+use drive_core::{
+    Class, Direction, Drive, Error, Follower, Ground, Lease, Lifetimes, Refusal, Setpoint, later,
+};
 use tokio::time::Instant;
 
 use crate::{
@@ -121,15 +123,15 @@ pub(crate) fn said(panic: &(dyn Any + Send)) -> String {
 fn lifetimes(job: Job, lifetime: Lifetime) -> Lifetimes {
     let Lifetime { call, all, is_for_a_stop } = lifetime;
     let polls_as = is_for_a_stop.then_some(Class::Stop);
+    let until = all.map(|all| later(Instant::now(), all));
     let usual = Lifetimes { polls_as, ..Lifetimes::default() };
     match job {
         Job::Status { .. } => Lifetimes { status: call, ..usual },
-        Job::SetSetpoint(..) | Job::Start(_) => {
-            let command_until = all.map(|all| Instant::now() + all);
-            Lifetimes { command: call, command_until, ..usual }
-        }
+        Job::SetSetpoint(..) | Job::Start(_) => Lifetimes { command: call, command_until: until, ..usual },
         // Their steps belong together: what has risen is to fall again.
-        Job::ResetFaults | Job::Release | Job::Persist => Lifetimes { command: call, ..usual },
+        Job::ResetFaults | Job::Release | Job::Persist => {
+            Lifetimes { command: call, begun_until: until, ..usual }
+        }
         Job::Stop(_) | Job::Withdraw => Lifetimes { command: None, ..usual },
         _ => usual,
     }
@@ -217,7 +219,9 @@ mod tests {
             assert!(of_order.command_until.is_some_and(|until| until <= Instant::now() + MS_54), "{order:?}");
         }
         for order in [Job::ResetFaults, Job::Release, Job::Persist] {
-            assert_eq!(lifetimes(order, short), Lifetimes { command: time, ..usual }, "{order:?}");
+            let of_order = lifetimes(order, short);
+            assert_eq!((of_order.command, of_order.command_until), (time, None), "{order:?}");
+            assert!(of_order.begun_until.is_some_and(|until| until <= Instant::now() + MS_54), "{order:?}");
         }
         for stop in [Job::Stop(StopMode::Ramp), Job::Withdraw] {
             assert_eq!(lifetimes(stop, short), Lifetimes { command: None, ..usual }, "{stop:?}");

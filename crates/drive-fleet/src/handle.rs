@@ -374,8 +374,8 @@ impl DriveHandle {
         self.order_on(None, Some(Expiry::at(expires)), order)
     }
 
-    /// Gives an order that somebody gave then, with another lifetime than that of the settings: where nothing of it was sent by its end it
-    /// never is, and what a start has to write behind its first word follows within 2 s more.
+    /// Gives an order that somebody gave then, with another lifetime than that of the settings: nothing of it is written behind its end. A
+    /// start for which its drive was asked something by then, as one that takes long to answer is, goes on for 2 s at the most.
     pub fn order_since(&self, order: Order, given: Instant, lifetime: Duration) -> Ticket {
         self.order_on(None, Some(Expiry::since(given, lifetime)), order)
     }

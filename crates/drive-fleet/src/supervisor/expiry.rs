@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use drive_core::later;
 use tokio::time::Instant;
 
 /// How much longer than its lifetime what a start has to write behind its first word may take, where whoever gave it has said no time: a
@@ -20,8 +21,8 @@ pub(crate) struct Expiry {
 impl Expiry {
     /// Of an order that was given then, by the settings of its drive.
     pub(crate) fn since(given: Instant, lifetime: Duration) -> Self {
-        let begun = given + lifetime;
-        Self { begun, sent: begun + FURTHER }
+        let begun = later(given, lifetime);
+        Self { begun, sent: later(begun, FURTHER) }
     }
 
     /// Where somebody has said when.
@@ -33,10 +34,11 @@ impl Expiry {
         if has_begun { self.sent } else { self.begun }
     }
 
-    /// What is left of it.
-    pub(super) fn left(self, now: Instant, has_begun: bool) -> Lifetime {
+    /// What is left of it. Only a start goes on: what is one write is sent in its time or never.
+    pub(super) fn left(self, now: Instant, is_start: bool, has_begun: bool) -> Lifetime {
         let left = |until: Instant| Some(until.saturating_duration_since(now));
-        Lifetime { call: left(self.of(has_begun)), all: left(self.sent), ..Lifetime::default() }
+        let all = if is_start { self.sent } else { self.begun };
+        Lifetime { call: left(self.of(has_begun)), all: left(all), ..Lifetime::default() }
     }
 }
 

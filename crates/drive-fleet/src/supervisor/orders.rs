@@ -227,8 +227,11 @@ impl Supervisor {
 
     /// How long the calls of the order in flight may wait.
     pub(super) fn order_lifetime(&self, now: Instant) -> Lifetime {
-        let left = |active: &Active| active.expiry.left(now, active.setpoint_given.is_some());
-        self.active.as_ref().map_or(Expiry::at(now).left(now, false), left)
+        let left = |active: &Active| {
+            let is_start = matches!(active.order, Order::Start { .. });
+            active.expiry.left(now, is_start, active.setpoint_given.is_some())
+        };
+        self.active.as_ref().map_or(Expiry::at(now).left(now, false, false), left)
     }
 
     /// The job that the orders want next, and how long it may take.
