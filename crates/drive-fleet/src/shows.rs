@@ -127,6 +127,7 @@ mod tests {
             attempts: 1,
             taken: false,
             alarm: true,
+            undone: 0,
         };
         let running = Some(State::Running);
         assert_eq!(Shows::of(Link::Lost, Some(&stop), running), Shows::Lost);

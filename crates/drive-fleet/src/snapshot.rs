@@ -200,6 +200,15 @@ pub struct PendingStop {
     pub taken: bool,
     /// Whether it has gone without a confirmation for so long that it is an alarm.
     pub alarm: bool,
+    /// How often a run command has come behind it: the drive had taken it, was seen all the while, and drives the motor again.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_none"))]
+    pub undone: u32,
+}
+
+#[cfg(feature = "serde")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
+const fn is_none(times: &u32) -> bool {
+    *times == 0
 }
 
 impl PendingStop {
@@ -213,11 +222,10 @@ impl PendingStop {
         }
     }
 
-    /// Whether a run command has come behind it since it was seen so before: the drive had taken it, and drives the motor again.
+    /// How often a run command has come behind it since it was seen so before.
     #[must_use]
-    pub fn is_undone_since(&self, before: &Self, motion: Motion) -> bool {
-        // Direct current that has brought it to rest is ended by another mode, and nobody has started it.
-        before.taken && !self.taken && before.mode == self.mode && motion == Motion::Driven
+    pub const fn undone_since(&self, before: &Self) -> u32 {
+        self.undone.saturating_sub(before.undone)
     }
 }
 

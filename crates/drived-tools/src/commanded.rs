@@ -70,14 +70,14 @@ impl Course {
         self.last.is_some_and(|last| last.taken)
     }
 
-    fn look(&mut self, now: PendingStop, motion: Motion) -> impl Iterator<Item = News> + use<> {
+    fn look(&mut self, now: PendingStop) -> impl Iterator<Item = News> + use<> {
         let before = self.last.replace(now);
         let was = |is: &dyn Fn(&PendingStop) -> bool| before.as_ref().is_some_and(is);
         let was_taken = was(&|stop| stop.taken);
-        let restarted = was(&|before| now.is_undone_since(before, motion));
-        self.restarts += u32::from(restarted);
+        let restarts = before.map_or(0, |before| now.undone_since(&before));
+        self.restarts += restarts;
         let news = [
-            restarted.then_some(News::Restarted),
+            (restarts > 0).then_some(News::Restarted),
             (now.alarm && !was(&|stop| stop.alarm)).then_some(News::Alarm),
             (now.taken && !was_taken).then_some(News::Taken),
         ];
@@ -293,7 +293,7 @@ impl Commanded {
                         self.say(format_args!("{name}: the stop cannot be sent yet: {why}{whose}"));
                     }
                     let status = self.status();
-                    for news in course.look(pending, status.motion) {
+                    for news in course.look(pending) {
                         match news {
                             News::Restarted => self.say_restarted(&status),
                             News::Alarm => {

@@ -32,6 +32,7 @@ impl Supervisor {
         self.changed = true;
         self.unseen = true;
         self.given = None;
+        self.doubt_stop();
         self.checks.connected(now);
         if self.link == Link::Connected {
             self.pace.hurry(now);

@@ -396,6 +396,7 @@ impl Supervisor {
         self.off_setpoint.forget();
         self.acted = None;
         self.explanations = 0;
+        self.doubt_stop();
         self.end_orders_by_loss();
         self.end_questions(&Refused::NotConnected);
     }

@@ -62,6 +62,8 @@ pub(super) struct Stopping {
     of_another: bool,
     /// The drive has shown that no run command is in force.
     taken: bool,
+    /// It had, before it was not heard or its line was lost: what it shows first decides.
+    was_taken: bool,
     /// Since when the drive injects for it.
     injects_since: Option<Instant>,
     /// The lowest output since it was given, and anew since it was taken.
@@ -70,8 +72,8 @@ pub(super) struct Stopping {
     next_try: Option<Instant>,
     pause: Duration,
     error: Option<Error>,
-    /// The motor ran again behind it.
-    was_undone: bool,
+    /// How often the motor ran again behind it.
+    undone: u32,
     /// By whose run command it did, as far as the drive told.
     runs_by: Option<Refusal>,
     /// Until when the drive may be without it before that is an alarm.
@@ -109,6 +111,7 @@ impl Stopping {
             attempts: self.begun,
             taken: self.taken,
             alarm: self.alarm_at.is_none(),
+            undone: self.undone,
         }
     }
 
@@ -133,11 +136,28 @@ impl Stopping {
         }
     }
 
+    /// Nobody has seen whether it acts still.
+    pub(super) const fn doubt(&mut self) {
+        self.was_taken |= std::mem::replace(&mut self.taken, false);
+    }
+
+    /// What the drive shows first behind a time in which nobody saw it. A motor that is driven may be on its ramp still, where its words do not
+    /// tell a stop from a run: the stop is given anew, and nobody is blamed.
+    const fn see_again(&mut self, now: Instant, motion: Motion) {
+        if !std::mem::replace(&mut self.was_taken, false) || self.taken {
+            return;
+        }
+        match motion {
+            Motion::Driven => self.next_try = Some(now),
+            _ => self.taken = true,
+        }
+    }
+
     /// A run command has come behind it, kept back on its way or from somebody else: it is written again at once, and has no more time
     /// than from when it was given, whatever its ramp had gained.
-    fn undone(&mut self, now: Instant, status: &Status, standstill: Duration) {
+    fn is_undone(&mut self, now: Instant, status: &Status, standstill: Duration) {
         self.taken = false;
-        (self.was_undone, self.runs_by) = (true, who_runs(status));
+        (self.undone, self.runs_by) = (self.undone.saturating_add(1), who_runs(status));
         self.next_try = Some(now);
         self.alarm_at = self.alarm_at.map(|at| at.min(self.patient_until));
         for waiter in self.waiters.iter_mut().filter(|waiter| !waiter.asker.is_exit()) {
@@ -148,7 +168,7 @@ impl Stopping {
     /// The motor comes down by itself. As long as it does, its time begins anew: a long ramp is no alarm, a ramp that hangs is. Not
     /// behind a stop that was undone: what sinks between two run commands would have all the time that there is.
     fn comes_down(&mut self, now: Instant, output: Option<Frequency>, standstill: Duration) {
-        let Some(output) = output.filter(|_| !self.was_undone) else { return };
+        let Some(output) = output.filter(|_| self.undone == 0) else { return };
         let Some(lowest) = self.lowest else {
             self.lowest = Some(output);
             self.alarm_at = self.alarm_at.map(|at| at.min(now + HANGS));
@@ -171,7 +191,7 @@ impl Stopping {
             None | Some(Error::NotConfirmed { because: None, .. }) => false,
             Some(_) => true,
         };
-        let Some(output) = output.filter(|_| !is_denied && !self.was_undone) else { return };
+        let Some(output) = output.filter(|_| !is_denied && self.undone == 0) else { return };
         let Some(lowest) = self.lowest else {
             self.lowest = Some(output);
             return;
@@ -241,6 +261,13 @@ impl Supervisor {
         self.stopping.as_ref().map(order)
     }
 
+    /// Nobody sees the drive for now.
+    pub(super) const fn doubt_stop(&mut self) {
+        if let Some(stopping) = &mut self.stopping {
+            stopping.doubt();
+        }
+    }
+
     /// For how long direct current is to be held now.
     pub(crate) fn injection(&self) -> Option<Duration> {
         self.stopping.as_ref().and_then(|stopping| stopping.injection).or(self.settings.injection)
@@ -299,12 +326,13 @@ impl Supervisor {
                     asker,
                     of_another,
                     taken: false,
+                    was_taken: false,
                     injects_since: None,
                     lowest: output,
                     next_try: Some(now),
                     pause: REPEAT.0,
                     error: None,
-                    was_undone: false,
+                    undone: 0,
                     runs_by: None,
                     patient_until: now + patience,
                     alarm_at: Some(now + patience),
@@ -408,6 +436,7 @@ impl Supervisor {
         if stopping.attempts == 0 {
             return;
         }
+        stopping.see_again(now, motion);
         let injects = stopping.used == StopMode::DcInjection;
         let injected_for = stopping.injects_since.map(|since| now.saturating_duration_since(since));
         match motion {
@@ -422,7 +451,7 @@ impl Supervisor {
                 }
             }
             Motion::Driven if crate::mutant!("run-behind-a-stop-left", true, false) => {
-                stopping.undone(now, &status.value, standstill);
+                stopping.is_undone(now, &status.value, standstill);
             }
             _ => {
                 // What direct current holds has no output that could come down; its own time ends it.
@@ -485,7 +514,7 @@ impl Supervisor {
         stopping.since = stopping.asked_at;
         stopping.patient_until = stopping.since + self.settings.times.stop_alarm;
         stopping.alarm_at = Some(stopping.since + self.settings.times.standstill);
-        (stopping.was_undone, stopping.runs_by, stopping.lowest) = (false, None, None);
+        (stopping.undone, stopping.runs_by, stopping.lowest) = (0, None, None);
         self.stopping = Some(stopping);
         self.pace.hurry(now);
         for (asker, modes) in confirmed {

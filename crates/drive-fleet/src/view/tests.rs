@@ -90,8 +90,14 @@ async fn a_snapshot_tells_what_is_known_with_the_age_and_quality_of_each_value()
     let identity = Identity { model: Some("ATV312HU15N4".to_owned()), ..Identity::default() };
     let armed = Watchdog { timeout: Some(Duration::from_secs(10)), reaction: Some(Reaction::Ramp) };
     let restart = SelfRestart { code: "Atr", meaning: "starts the motor again by itself" };
-    let stop =
-        PendingStop { mode: StopMode::Ramp, since: Instant::now(), attempts: 2, taken: false, alarm: true };
+    let stop = PendingStop {
+        mode: StopMode::Ramp,
+        since: Instant::now(),
+        attempts: 2,
+        taken: false,
+        alarm: true,
+        undone: 0,
+    };
     let measurements = Some(Timed::<Measurements>::new(measurements, Instant::now()));
     advance(Duration::from_secs(10)).await;
     let snapshot = Snapshot {
@@ -448,7 +454,14 @@ async fn a_snapshot_reads_back_as_it_was_told() {
         setpoint: Some(Speed::from_rpm(900).into()),
         identity: IdentityCheck::CannotSay,
         watchdog: WatchdogCheck::Broken("not kept".to_owned()),
-        stop: Some(PendingStop { mode: StopMode::Fast, since: now, attempts: 1, taken: true, alarm: false }),
+        stop: Some(PendingStop {
+            mode: StopMode::Fast,
+            since: now,
+            attempts: 1,
+            taken: true,
+            alarm: false,
+            undone: 0,
+        }),
         since: vec![(crate::ConcernKind::WatchdogBroken, now)],
         ..nothing_known()
     };

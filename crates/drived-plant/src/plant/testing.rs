@@ -139,8 +139,14 @@ pub fn every_pair_of_troubles(now: Instant) -> Vec<(Snapshot, DriveView, String)
         change(&mut status);
         timed.value = Arc::new(status);
     };
-    let stop =
-        |alarm, now| PendingStop { mode: StopMode::Ramp, since: now, attempts: 3, taken: false, alarm };
+    let stop = |alarm, now| PendingStop {
+        mode: StopMode::Ramp,
+        since: now,
+        attempts: 3,
+        taken: false,
+        alarm,
+        undone: 0,
+    };
     let error = || Error::Unsupported { what: "a test", reason: "it is one" };
     let identity = || Arc::new(Identity::default());
     let troubles: Vec<Trouble> = vec![

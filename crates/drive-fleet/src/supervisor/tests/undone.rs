@@ -106,6 +106,35 @@ fn a_stop_that_is_undone_once_and_taken_again_in_its_time_is_no_alarm() {
     assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp); 2]);
 }
 
+/// Behind a line that was lost on its ramp some drives show no more than a motor that is driven, because what tells a stop from a run is
+/// read anew.
+#[test]
+fn a_stop_behind_which_its_line_was_lost_is_given_anew_where_that_does_not_show_and_undone_by_nobody() {
+    for shows in [true, false] {
+        let mut rig = running();
+        let id = rig.stop(StopMode::Ramp);
+        rig.pass(3_000 * MS);
+        let before = rig.snapshot().stop.unwrap();
+        assert!(before.taken);
+        if rig.machine.handle_line_lost(rig.now) {
+            rig.machine.handle_dropped(rig.now);
+        }
+        if !shows {
+            rig.drive.run();
+        }
+        while !rig.snapshot().stop.unwrap().taken {
+            assert_eq!(rig.snapshot().stop.unwrap().undone_since(&before), 0, "{shows}");
+            rig.pass(10 * MS);
+        }
+        rig.drive.stand();
+        rig.pass(1_000 * MS);
+        assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed), "{shows}: {:?}", rig.outcome(id));
+        let stops = rig.drive.writes();
+        assert_eq!(stops.len(), if shows { 1 } else { 2 }, "{shows}: {stops:?}");
+        assert_eq!((alarms(&rig), reason(&rig)), (0, None), "{shows}: {:?}", rig.events());
+    }
+}
+
 #[test]
 fn a_stop_that_is_undone_late_on_its_ramp_is_an_alarm_and_over_as_soon_as_that_is_seen() {
     let mut rig = running();

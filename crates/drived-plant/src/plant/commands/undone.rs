@@ -2,7 +2,7 @@
 
 use std::pin::pin;
 
-use drive_fleet::{DriveHandle, Outcome, StopTicket};
+use drive_fleet::{DriveHandle, Outcome, PendingStop, StopTicket};
 
 /// What is told of it, beside what became of the stop.
 pub(super) const UNDONE: &str =
@@ -17,10 +17,9 @@ pub(super) async fn finished(stop: &StopTicket, drive: &DriveHandle, mut undone:
             outcome = &mut finished => return outcome,
             Ok(()) = watch.changed() => {
                 let seen = watch.look();
-                let (Some(now), Some(status)) = (seen.stop, &seen.status) else { continue };
-                if before.replace(now).is_some_and(|before| now.is_undone_since(&before, status.value.motion)) {
-                    undone();
-                }
+                let Some(now) = seen.stop else { continue };
+                let times = before.replace(now).map_or(0, |before: PendingStop| now.undone_since(&before));
+                (0..times).for_each(|_| undone());
             }
         }
     }
