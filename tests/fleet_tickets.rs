@@ -60,6 +60,20 @@ async fn no_stop_is_lost_beside_a_branch_that_is_ready() {
     }
 }
 
+/// [`drive_bus::Line::close`]: "what waits ends with `PortError::Closed`, but for the write of a stop, which is sent."
+#[tokio::test(start_paused = true)]
+async fn a_stop_behind_which_its_line_is_closed_at_once_is_sent() {
+    for layer in [Layer::Handle, Layer::Group, Layer::Fleet] {
+        let plant = Plant::single(Family::ATV312, |settings| settings.watchdog = None);
+        plant.run_at(1).await;
+        stop_beside_what_is_ready(&plant, layer, true).await;
+        plant.lines[0].close().await;
+        // Its own watchdog would stop it after ten.
+        sleep(3 * SECOND).await;
+        assert!(!plant.machine().observe().running, "{layer:?}");
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_start_whose_time_was_over_before_it_was_heard_leaves_the_motor_at_rest() {
     for late in (0..=160).step_by(4).map(Duration::from_millis) {

@@ -6,7 +6,7 @@ use drive_clock::Sleeps;
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     sync::watch,
-    time::Instant,
+    time::{Instant, sleep},
 };
 
 use crate::{
@@ -22,6 +22,9 @@ use crate::{
     task::Task,
     transport::{BoxedStream, Connector, Given, Guarded, OpenError, begin},
 };
+
+/// How long what somebody else was asked for just now may take to come to the line.
+const HANDED_ON: Duration = Duration::from_millis(2);
 
 /// One line and the task that owns its port. Cheap to clone; when the last handle ([`Line`] or [`Slave`]) is gone, the
 /// exchange that is under way finishes and the port is closed.
@@ -71,6 +74,9 @@ impl Line {
     ///
     /// # Errors
     /// [`OpenError`] when the configuration names no port.
+    ///
+    /// # Panics
+    /// Outside a tokio runtime, as [`over`](Self::over) and [`over_reopened`](Self::over_reopened): its task lives there.
     pub fn start(config: LineConfig) -> Result<Self, OpenError> {
         let connector = Connector::to(&config)?;
         Ok(Self::spawn(config, connector, None, Sleeps::new()))
@@ -222,7 +228,12 @@ impl Line {
 
     /// Closes the line: what waits ends with [`PortError::Closed`](drive_core::PortError::Closed), but for the write of a stop, which
     /// is sent; the exchange that is under way finishes, the port is closed. Returns when it is.
+    ///
+    /// What a fleet was asked a moment ago may not have come to the line yet: shut it down, and await that, before its
+    /// lines are closed.
     pub async fn close(&self) {
+        // A task that was told of a stop before has run by then, and the stop is in the queue.
+        sleep(HANDED_ON).await;
         self.handle.close().await;
     }
 }

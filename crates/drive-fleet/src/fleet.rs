@@ -168,6 +168,9 @@ impl Fleet {
     ///
     /// # Cancellation
     /// When the future is dropped the policies go on, without a limit, and the drives are asked on for as long as a handle is left.
+    ///
+    /// # Panics
+    /// When the future is polled outside a tokio runtime, for `limit` needs its clock; the policies act all the same.
     #[must_use = "a drive that was not stopped may run"]
     pub fn shutdown(
         &self,

@@ -242,6 +242,9 @@ impl DriveHandle {
     ///
     /// # Errors
     /// Why a start would be refused.
+    ///
+    /// # Panics
+    /// Outside a tokio runtime, for `patience` needs its clock.
     pub async fn ready(&self, patience: Duration) -> Result<(), Refused> {
         // Patience without end is a wish that a point in time could not hold.
         let mut over = pin!(sleep(patience));

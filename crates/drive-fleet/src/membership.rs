@@ -38,6 +38,12 @@ impl Fleet {
     ///
     /// # Errors
     /// [`FleetError`] with what does not fit; nothing was added then. [`FleetError::ShutDown`] after the end of the fleet.
+    ///
+    /// # Panics
+    /// Outside a tokio runtime, in which the tasks of its drives are to live.
+    ///
+    /// # Deadlocks
+    /// `add` may not change the members itself, by this or another method: whoever does waits until it has returned.
     pub fn extend(&self, add: impl FnOnce(FleetBuilder) -> FleetBuilder) -> Result<(), FleetError> {
         let _changing = self.inner.changing.lock().unwrap_or_else(PoisonError::into_inner);
         let events = self.sender().ok_or(FleetError::ShutDown)?;

@@ -129,7 +129,8 @@ pub enum Outcome {
     Stopped(StopModes),
     /// It was sent, or a part of it, and the drive's own words do not show it. A run command may still take effect later, so that a
     /// start is taken back by a ramp stop, which is repeated until it is confirmed; not one whose run word was not sent
-    /// ([`Unconfirmed::NotStarted`]).
+    /// ([`Unconfirmed::NotStarted`]), and not one that [was in force](crate::Ticket::in_force), of which no more was waited for than that it
+    /// comes to its setpoint.
     NotConfirmed(Unconfirmed),
     /// Its lifetime ran out before it was sent. It never will be.
     Expired,

@@ -31,7 +31,8 @@ use crate::{
 /// - A setpoint that was given by itself stays. A reset, a release and a save that are under way are finished: they are edges, and half of one
 ///   would stand in the drive.
 ///
-/// Once its outcome was heard, dropping it does nothing.
+/// Once its outcome was heard, dropping it does nothing. **Behind the last handle of the fleet it does nothing either**: nothing more is begun
+/// then, see [`Fleet`](crate::Fleet). A struct that holds both declares its tickets first, because fields are dropped in that order.
 ///
 /// # Example
 ///
