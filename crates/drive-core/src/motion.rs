@@ -392,14 +392,21 @@ impl Shaft {
     }
 
     fn brake(&mut self, at: Instant, output: Frequency, before: Descent) {
+        let still = output == Frequency::ZERO;
+        // At no output the words of a ramp may be of the moment before a cut, and those of one whose output was cut already bring
+        // nothing down.
+        let is_cut = before.is_cut(at, self.ramp());
+        let coasting = match self.past {
+            _ if !still => None,
+            Past::Unseen => Some(at),
+            Past::Driven { still: false, .. } if is_cut || !before.falls => Some(at),
+            Past::Braked { still: false } if is_cut => Some(at),
+            Past::Coasts(since) if !self.has_coasted(at, since) => Some(since),
+            _ => None,
+        };
         self.descent = if self.was_braked() { before } else { Descent::default() };
         self.descent.see(at, output.centihertz());
-        let still = output == Frequency::ZERO;
-        // One whose output was cut is not brought down by what its words still say of a ramp.
-        let coasts = matches!(self.past, Past::Coasts(since) if still && !self.has_coasted(at, since));
-        if !coasts {
-            self.past = Past::Braked { still };
-        }
+        self.past = coasting.map_or(Past::Braked { still }, Past::Coasts);
     }
 
     /// A run command acts, at no output. It stands where it stood, or was seen to come down so far; else it may coast below a run
@@ -551,6 +558,37 @@ mod tests {
         }
         assert_eq!(shaft.see(after(2), Output::Cut, Some(Frequency::from_hertz(1))), Motion::Braking);
         assert_eq!(shaft.see(after(3), Output::None, Some(Frequency::ZERO)), Motion::AtRest);
+    }
+
+    /// An Altivar 21 was let coast, tripped or lost its release between the word that says that it runs and the output.
+    #[tokio::test(start_paused = true)]
+    async fn the_words_of_a_ramp_at_no_output_tell_standstill_only_where_it_was_seen_to_come_down() {
+        let begun = Instant::now();
+        let after = |milliseconds| begun + Duration::from_millis(milliseconds);
+        let zero = Output::Braking(Frequency::ZERO);
+        let driven: fn(Frequency) -> Output = |_| Output::Driven;
+        for (what, shown, outputs, gone, motion) in [
+            ("never seen", driven, &[][..], 100, Motion::Coasting),
+            ("at its speed", driven, &[40, 40], 100, Motion::Coasting),
+            ("at a low speed, which it came down to once", driven, &[4, 3, 3], 2_000, Motion::Coasting),
+            ("on its way to a lower speed", driven, &[40, 39], 1_000, Motion::Coasting),
+            ("almost at zero", driven, &[2, 1], 100, Motion::AtRest),
+            ("in a ramp", Output::Braking, &[40, 39], 1_000, Motion::Coasting),
+            ("in a ramp that had the time to end", Output::Braking, &[40, 39], 3_900, Motion::AtRest),
+        ] {
+            let (mut shaft, mut last) = (Shaft::new(), 0);
+            for (look, hertz) in (0..).zip(outputs) {
+                let output = Frequency::from_hertz(*hertz);
+                last = 100 * look;
+                shaft.see(after(last), shown(output), Some(output));
+            }
+            shaft.see(after(last + gone), zero, Some(Frequency::ZERO));
+            for cut in [Output::None, Output::Gone, Output::Cut] {
+                let mut shaft = shaft;
+                let told = shaft.see(after(last + gone + 100), cut, Some(Frequency::ZERO));
+                assert_eq!(told, motion, "{what}: {cut:?}");
+            }
+        }
     }
 
     /// An Altivar 58 was let coast, and its panel took it and commanded nothing, between two looks.

@@ -6,3 +6,4 @@ mod motion;
 mod reading;
 mod settings;
 mod support;
+mod torn;
