@@ -29,7 +29,7 @@ impl<P: Port> Atv312<P> {
     /// What decides the reference instead of the bus, or would after a start by the bus, as far as settings, inputs and the
     /// drive's own words tell it.
     pub(crate) async fn other_reference(&mut self) -> Result<Option<Refusal>> {
-        self.read_channels(Class::Command).await?;
+        self.read_references(Class::Command).await?;
         let held = self.proof.held().unwrap_or(0);
         self.judge_reference(held).await
     }

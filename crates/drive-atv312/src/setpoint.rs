@@ -17,18 +17,19 @@ use crate::{
 
 impl<P: Port> Atv312<P> {
     pub(crate) async fn give_setpoint(&mut self, setpoint: Setpoint) -> Result<()> {
-        self.read_settings(Class::Command).await?;
-        if self.known.settings.refuses_reference().is_some() {
-            // It may have been set right since.
-            self.read_channels(Class::Command).await?;
-        }
-        if let Some(reason) = self.known.settings.refuses_reference() {
-            return Err(self.refused(Command::Setpoint(setpoint), reason));
-        }
         if let Some(reason) = self.refuses_writes() {
             return Err(self.refused(Command::Setpoint(setpoint), reason));
         }
         let words = self.fast_words(Class::Command).await?;
+        // Whoever stands at a drive whose motor rests may have set otherwise whose reference it follows, or may have set it right since.
+        if !words.state_words().is_driving() || self.known.settings.refuses_reference().is_some() {
+            self.read_references(Class::Command).await?;
+        } else {
+            self.read_settings(Class::Command).await?;
+        }
+        if let Some(reason) = self.known.settings.refuses_reference() {
+            return Err(self.refused(Command::Setpoint(setpoint), reason));
+        }
         // What a count is, and which way the reference that stands turns the motor, another master may have changed.
         let controls = self.read_controls(Class::Command).await?;
         let resolution = controls.resolution();
@@ -73,7 +74,14 @@ impl<P: Port> Atv312<P> {
             if running && confirming.again().await {
                 continue;
             }
-            let other = self.refuses_reference(&words).or(self.other_reference().await?);
+            let held = self.proof.held().unwrap_or(0);
+            let other = if words.state_words().is_driving() {
+                self.other_reference().await?
+            } else {
+                // What the settings say was read in front of the write.
+                self.judge_reference(held).await?
+            };
+            let other = self.refuses_reference(&words).or(other);
             let because = if running { other.or(Some(OTHER_REFERENCE)) } else { other };
             return match because {
                 None if self.holds_setpoint().await? => Ok(()),

@@ -452,6 +452,27 @@ async fn whatever_setting_was_learnt_is_read_again_in_its_turn() {
     }
 }
 
+/// What somebody at the keypad may have set otherwise while the motor stood: all that is read but AdC, which decides nothing of a start.
+#[tokio::test(start_paused = true)]
+async fn each_start_reads_anew_all_that_decides_what_it_does() {
+    // LAC, CCS, rFC, Fr1, Stt, rPS, LC2, EtF, CHP, Pr2, PS2, SA2, PIF, JOG, Atr; below L3 those that count there.
+    let at_l3 =
+        [3006, 8421, 8411, 8413, 11201, 9010, 9202, 7131, 8011, 11909, 11401, 11801, 11901, 11110, 7122];
+    let below = [3006, 11201, 11401, 11801, 11901, 11110, 7122];
+    for (settings, read, blocks) in [(&[][..], &at_l3[..], 15), (&[(3006, 0)], &below[..], 7)] {
+        let mut drive = watched(&[&FOR_THE_BUS, &RUNS, settings]).await;
+        for _ in 0..2 {
+            drive.start(Direction::Forward).await.unwrap();
+        }
+        let asked = drive.into_port().asked;
+        for &setting in read {
+            let times = asked.iter().filter(|asked| asked.reads(setting)).count();
+            assert_eq!(times, 3, "{setting}: once before, and for each start");
+        }
+        assert_eq!(read.len(), blocks);
+    }
+}
+
 /// An analog input is another word at each reading, and each of them another question.
 #[tokio::test(start_paused = true)]
 async fn a_reference_from_elsewhere_that_never_stands_still_is_told_as_another_one() {

@@ -10,7 +10,6 @@ use drive_core::{
     registers::{Register, access::Kind},
 };
 use drive_drivecom::{self as drivecom, StopWord};
-use tokio::time::Instant;
 
 use crate::{
     ramp::Ramp,
@@ -83,6 +82,8 @@ const BLOCKS: &[Block] = &[
 const FOR_THE_COMMAND: usize = 4;
 /// The blocks that decide a stop: at L1 and L2, and at L3, where any bit above the chart's may have got another meaning.
 const FOR_A_STOP: (usize, usize) = (7, 13);
+/// The blocks of what takes the place of a reference of the bus, or is added to it, whichever channel gives it.
+const REPLACE_A_REFERENCE: &[u16] = &[address::PS2, address::SA2, address::PIF, address::JOG];
 /// The functions that a bit of the control word can be assigned to, besides the stops.
 const FUNCTIONS: [u16; 10] = [
     address::RPS,
@@ -110,8 +111,6 @@ pub(crate) struct Known {
     /// The registers that this drive lacks.
     pub(crate) absent: Absent,
     pub(crate) speeds: Option<(Speed, Speed)>,
-    /// When it was read last whether the drive starts again by itself, `Atr`.
-    pub(crate) restart_at: Option<Instant>,
     /// Whether a status was read since, so that the next one has time for a setting.
     pub(crate) seen: bool,
 }

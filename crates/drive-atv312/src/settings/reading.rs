@@ -1,21 +1,15 @@
 //! The settings and the control variables on the wire: what is read once, what is read anew, and when.
 
-use std::time::Duration;
-
 use drive_core::{Class, Error, ErrorKind, Frequency, Ground, Port, Result, Speed};
 use drive_drivecom::{self as drivecom, Limits};
-use tokio::time::Instant;
 
-use super::{BLOCKS, Block, FOR_A_STOP, Settings};
+use super::{BLOCKS, Block, FOR_A_STOP, REPLACE_A_REFERENCE, Settings};
 use crate::{
     Atv312,
     reading::Resolution,
     registers::{CMD, SMIL, TFR, address},
     words::{AccessLevel, ExtendedControl},
 };
-
-/// How long `Atr` is taken for what it was: many starts behind each other have no time for one exchange more each.
-const RESTART_HOLDS: Duration = Duration::from_secs(30);
 
 impl<P: Port> Atv312<P> {
     /// Bit 9 of `CMI`: one exchange once.
@@ -40,25 +34,26 @@ impl<P: Port> Atv312<P> {
 
     /// The settings, and anew those that say whose the reference is: whoever stands at the drive may have set them otherwise since they
     /// were read, and of a motor that stands no word tells it. Below L3 it is the level itself that may have changed.
-    pub(crate) async fn read_channels(&mut self, class: Class) -> Result<()> {
+    pub(crate) async fn read_references(&mut self, class: Class) -> Result<()> {
         let channels: &[u16] = match self.known.settings.level() {
             Some(AccessLevel::L3) => &[address::RFC, address::FR1],
             _ => &[address::LAC],
         };
-        self.read_again(class, channels).await
+        self.read_again(class, &[channels, REPLACE_A_REFERENCE].concat()).await
     }
 
     /// The settings, and anew those that decide what a command word does. A drive takes them while its motor stands alone, so that what is
     /// read for a start holds for its stop.
     pub(crate) async fn read_meanings(&mut self, class: Class) -> Result<()> {
-        self.read_again(class, &meanings().collect::<Vec<_>>()).await
+        let meanings = BLOCKS.iter().take(FOR_A_STOP.1).map(|(first, ..)| *first);
+        self.read_again(class, &meanings.collect::<Vec<_>>()).await
     }
 
-    /// The same with what would start the motor again by itself, where nobody has looked lately: a start rests on that it does not.
+    /// The same with what would have the motor turn otherwise than it is asked to, or start again by itself: a start rests on all of it, and
+    /// no word of a motor that stands tells that somebody at the keypad has changed it a moment ago.
     pub(crate) async fn read_for_a_start(&mut self, class: Class) -> Result<()> {
-        let is_old = self.known.restart_at.is_none_or(|at| at.elapsed() > RESTART_HOLDS);
-        let restart = is_old.then_some(address::ATR);
-        self.read_again(class, &meanings().chain(restart).collect::<Vec<_>>()).await
+        let decide = BLOCKS.iter().map(|(first, ..)| *first).filter(|first| *first != address::ADC);
+        self.read_again(class, &decide.collect::<Vec<_>>()).await
     }
 
     async fn read_again(&mut self, class: Class, blocks: &[u16]) -> Result<()> {
@@ -115,9 +110,6 @@ impl<P: Port> Atv312<P> {
     /// The words of a block that this drive has. A function that it does not have is assigned to nothing.
     async fn read_block(&mut self, class: Class, (first, count, _): Block) -> Result<Vec<(u16, u16)>> {
         let words = self.known.absent.read(&mut self.registers.at(class), first, count).await?;
-        if first == address::ATR {
-            self.known.restart_at = Some(Instant::now());
-        }
         Ok((first..=u16::MAX).zip(words).filter_map(|(at, word)| Some((at, word?))).collect())
     }
 
@@ -163,11 +155,6 @@ impl<P: Port> Atv312<P> {
         self.take_extended(controls.cmi);
         Ok(controls)
     }
-}
-
-/// The blocks that decide what a command word does.
-fn meanings() -> impl Iterator<Item = u16> {
-    BLOCKS.iter().take(FOR_A_STOP.1).map(|(first, ..)| *first)
 }
 
 /// The control variables.

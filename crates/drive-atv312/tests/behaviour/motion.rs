@@ -275,7 +275,7 @@ async fn a_setpoint_is_refused_where_the_reference_comes_from_elsewhere() {
 
 /// Somebody at the keypad of a motor that stands sets Fr1 to AI1 (1), which was Mdb (164), and back (BBV51701 p. 35).
 #[tokio::test(start_paused = true)]
-async fn a_setpoint_is_not_confirmed_where_the_reference_was_set_elsewhere_since_the_drive_was_asked() {
+async fn a_setpoint_is_refused_where_the_reference_was_set_elsewhere_since_the_drive_was_asked() {
     let channel = |because: Option<Refusal>| match because {
         Some(Refusal::Overridden { by, .. }) => by,
         other => panic!("{other:?}"),
@@ -283,22 +283,63 @@ async fn a_setpoint_is_not_confirmed_where_the_reference_was_set_elsewhere_since
     let (mut drive, machine, _line) = rig();
     drive.set_setpoint(FIFTY).await.unwrap();
     assert!(machine.poke(row("Fr1").address, 1));
-    let error = drive.set_setpoint(FIFTY).await.unwrap_err();
-    let Error::NotConfirmed { because, .. } = error else { panic!("{error}") };
-    assert_eq!(
-        channel(because),
-        "the reference channel Fr1, which is not Mdb,",
-        "it is in the drive, and not in force"
-    );
-    // The motor would run at what AI1 says.
-    let error = drive.start(Direction::Forward).await.unwrap_err();
-    assert_eq!(error.kind(), ErrorKind::Refused, "{error}");
     let before = writes(&machine);
     let error = drive.set_setpoint(FIFTY).await.unwrap_err();
     assert_eq!(channel(refusal(&error)), "the reference channel Fr1, which is not Mdb,");
-    assert_eq!(writes(&machine), before, "what is known now is not tried");
+    // The motor would run at what AI1 says.
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Refused, "{error}");
+    assert_eq!(writes(&machine), before);
     assert!(machine.poke(row("Fr1").address, 164));
     drive.set_setpoint(FIFTY).await.unwrap();
+}
+
+/// Set at the keypad of a motor that stands, where no word tells it: the PI regulator on AI2 (p. 45), whose error would take the motor to HSP, a
+/// preset speed on LI3, which is closed (p. 43), jog operation on LI5 (p. 44), the bus summed to Fr1, which it is (p. 42).
+#[tokio::test(start_paused = true)]
+async fn what_was_set_to_take_the_place_of_the_setpoint_while_the_motor_stood_lets_no_setpoint_and_no_start_pass()
+ {
+    for (code, value, inputs, by) in [
+        ("PIF", 2, 0, "PIF"),
+        ("PS2", 131, 0b100, "preset"),
+        ("JOG", 133, 0b1_0000, "jog"),
+        ("SA2", 164, 0, "SA2"),
+    ] {
+        let (mut drive, machine, _line) = running().await;
+        drive.stop(StopMode::Ramp).await.unwrap();
+        machine.wait_until(|seen| !seen.running).await;
+        let before = commands(&machine).len();
+        assert!(
+            machine.poke(row("IOLR").address, inputs) && machine.poke(row(code).address, value),
+            "{code}"
+        );
+        let told = |error: Error| match error {
+            Error::Refused { reason, .. } => Some(reason),
+            Error::NotConfirmed { because, .. } => because,
+            _ => None,
+        };
+        let error = drive.set_setpoint(FIFTY).await.expect_err(code);
+        let is_named =
+            |reason| matches!(reason, Some(Refusal::Overridden { by: told, .. }) if told.contains(by));
+        assert!(is_named(told(error.clone())), "{code}: {error}");
+        let error = drive.start(Direction::Forward).await.expect_err(code);
+        assert!(error.kind() == ErrorKind::Refused && is_named(told(error.clone())), "{code}: {error}");
+        assert_eq!(commands(&machine).len(), before, "{code}");
+        assert!(machine.poke(row(code).address, 0));
+        drive.set_setpoint(FIFTY).await.unwrap_or_else(|error| panic!("{code}: {error}"));
+        drive.start(Direction::Forward).await.unwrap_or_else(|error| panic!("{code}: {error}"));
+    }
+}
+
+/// Atr = YES (p. 51), set at the keypad between a stop and the start behind it.
+#[tokio::test(start_paused = true)]
+async fn a_restart_by_itself_that_was_switched_on_while_the_motor_stood_is_seen_by_the_next_start() {
+    let (mut drive, machine, _line) = running().await;
+    drive.stop(StopMode::Ramp).await.unwrap();
+    machine.wait_until(|seen| !seen.running).await;
+    assert!(machine.poke(row("Atr").address, 1));
+    let error = drive.start(Direction::Forward).await.unwrap_err();
+    assert!(matches!(refusal(&error), Some(Refusal::RestartsItself(_))), "{error}");
 }
 
 /// Forced local (ETA bit 9 at 0, p. 21): the reference is that of FLOC (p. 55), AI1 as the drive leaves the factory.
