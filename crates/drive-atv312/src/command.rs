@@ -17,17 +17,43 @@ use crate::{
     reading::{FIRST, FastWords, raw_command},
     registers::{BLC, BRT, CMD, ETA, IOLR, LFR, LFRD, LFT, RRS, TCC, TCT},
     settings::{Controls, Known},
-    words::{AccessLevel, ControlWord, ExtendedControl, StatusWord},
+    words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, StatusWord},
 };
 
 impl<P: Port> Atv312<P> {
     pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Stopped> {
+        if mode == StopMode::DcInjection && self.injects && !self.known.settings.knows_stop() {
+            self.read_for_an_injection().await;
+        }
         let stopped = drivecom::stop(self, mode).await;
-        if matches!(stopped, Err(Error::NotConfirmed { .. })) {
-            // The settings may have been changed at the drive: the next attempt does without them, and reads them.
+        if matches!(stopped, Err(Error::NotConfirmed { because: None, .. })) {
+            // The settings may have been changed at the drive: the next attempt does without them, and reads them. Where the drive says who
+            // has the motor instead, they are not what it lacks.
             self.known.settings = Known::default().settings;
         }
         stopped
+    }
+
+    /// What an injection depends on, for a drive that was seen to inject and whose settings are not known: the quick stop, which is sure
+    /// without them, would end the direct current, and the motor would coast. Nothing is late meanwhile, for it is being braked; where it is
+    /// no more, or does not tell, the stop goes out without.
+    async fn read_for_an_injection(&mut self) {
+        let Ok(words) = self.fast_words(Class::Command).await else { return };
+        let Ok(controls) = self.read_controls(Class::Command).await else { return };
+        // By a bit of the bus: what an input injects ends with the input, and a run command would go on.
+        if !injects_by_the_bus(words.state_words())
+            || ControlWord::from_bits_retain(controls.command).is_run()
+        {
+            return;
+        }
+        while !self.known.settings.knows_stop() && !self.known.settings.is_complete() {
+            // Of so many readings one may be lost without the drive being so.
+            if self.read_setting(Class::Command).await.is_err()
+                && self.read_setting(Class::Command).await.is_err()
+            {
+                return;
+            }
+        }
     }
 
     /// Reads the fast words in a class, without making a status of them.
@@ -46,6 +72,7 @@ impl<P: Port> Atv312<P> {
             class == Class::Command && command.is_stop() || words.state_words().can_hold(command)
         });
         self.control = Some(words.state_words().control());
+        self.injects = injects_by_the_bus(words.state_words());
         self.see_shaft(&words);
         let verdict = self.evidence(&words).and_then(|evidence| self.proof.watch.run.verdict(&evidence));
         Ok(Status { verdict, ..self.status_of(&words) })
@@ -402,6 +429,13 @@ impl<P: Port> Drivecom for Atv312<P> {
         (fixed && words.is_driving() && words.control() != Control::Bus)
             .then(|| Refusal::NotInControl(words.control()))
     }
+}
+
+/// Whether the motor is braked by direct current while the bus commands.
+fn injects_by_the_bus(words: StatusWords) -> bool {
+    words.chart() == Some(ChartState::OperationEnabled)
+        && words.control() == Control::Bus
+        && words.eti.contains(ExtendedStatus::DC_INJECTION)
 }
 
 /// The word that stops every drive of this family at once, for the stops that no setting changes: the others would

@@ -86,6 +86,8 @@ pub struct Atv312<P> {
     high_bits: u16,
     /// Who commanded when it was last read.
     control: Option<Control>,
+    /// Whether direct current braked the motor by command of the bus in the last status.
+    injects: bool,
     /// What the bus control set-up has changed, with what it was before, in the order of the changes.
     set_up_before: Vec<(Register<WriteStopped>, u16)>,
     /// Whether the automatic restart is accepted.
@@ -115,6 +117,7 @@ impl<P: Port> Atv312<P> {
             known: Known::default(),
             high_bits: 0,
             control: None,
+            injects: false,
             set_up_before: Vec::new(),
             accepts_restart: false,
             counted: None,

@@ -115,6 +115,38 @@ async fn a_drive_that_was_adopted_running_is_stopped_in_each_mode() {
     }
 }
 
+/// The next program knows no setting of it. 0002h would end the direct current, and a motor without output coasts (BBV51701 p. 11, 40).
+#[tokio::test(start_paused = true)]
+async fn an_injection_of_before_that_is_given_anew_goes_on_at_whatever_access_level() {
+    for (mut drive, machine, line) in [rig(), factory()] {
+        bench::run_at_fifty(&mut drive, &machine).await;
+        drive.stop(StopMode::DcInjection).await.unwrap();
+        let mut next = Atv312::new(line.slave(1), bench::address(1));
+        assert_eq!(next.status().await.unwrap().motion, Motion::Braking);
+        let before = commands(&machine).len();
+        let stopped = next.stop(StopMode::DcInjection).await.unwrap();
+        assert_eq!((stopped.mode, stopped.instead), (StopMode::DcInjection, None));
+        assert_eq!(commands(&machine)[before..], [0x200F]);
+        assert_eq!(next.status().await.unwrap().motion, Motion::Braking);
+    }
+}
+
+/// dCI on LI4 (p. 41): the direct current ends with the input, and a run command that stands may act again.
+#[tokio::test(start_paused = true)]
+async fn a_stop_of_a_motor_that_an_input_injects_into_waits_for_no_settings() {
+    let (mut drive, machine, line) = rig();
+    bench::run_at_fifty(&mut drive, &machine).await;
+    assert!(machine.poke(row("dCI").address, 132) && machine.poke(row("IOLR").address, 0b1000));
+    let mut next = Atv312::new(line.slave(1), bench::address(1));
+    assert_eq!(next.status().await.unwrap().motion, Motion::Braking);
+    let before = machine.received().len();
+    let _ = next.stop(StopMode::DcInjection).await;
+    let behind: Vec<_> =
+        machine.received().split_off(before).into_iter().map(|request| request.pdu[0]).collect();
+    // The words and CMD, and the stop.
+    assert_eq!(behind[..3], [0x03, 0x03, 0x06], "{behind:x?}");
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_stop_that_the_settings_do_not_have_is_replaced_and_the_motor_stops() {
     for (code, value, mode, used, why) in [
