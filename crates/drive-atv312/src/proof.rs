@@ -56,8 +56,13 @@ impl<P: Port> Atv312<P> {
         let [_, _, (_, elsewhere), ..] = wanted;
         let wanted = self.proof.goes_on(wanted, 2, elsewhere);
         if let Some(look) = self.proof.choose(needed, wanted, things, Look::Turn) {
+            let was_told = self.command().is_some();
             // The status is good without it.
             let _ = self.look(look).await;
+            // The word that was read tells a stop along the ramp from a run.
+            if !was_told && self.command().is_some() {
+                self.see_shaft(&words);
+            }
             status = self.status_of(&words);
         }
         self.known.seen = true;

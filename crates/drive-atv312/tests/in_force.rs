@@ -172,6 +172,7 @@ async fn the_first_status_behind_a_stop_of_another_program_says_stopping() {
     let comes_down = [(3201, 0x0227), (3202, 200), (3206, 0x4412), (CMD, 0x100F)];
     let status = drive(&[&FOR_THE_BUS, &comes_down]).status().await.unwrap();
     assert_eq!(status.state, State::Stopping);
+    assert_eq!(status.motion, drive_core::Motion::Braking, "{status:?}");
     assert_eq!(status.output_frequency, Some(Frequency::from_hertz(20)));
 }
 
