@@ -8,6 +8,7 @@ use drive_families::Family;
 use drive_testing::{
     bench,
     rig::{ADDRESS, Rig},
+    truth::contradiction,
 };
 use support::{
     contracts::contract,
@@ -304,6 +305,45 @@ async fn a_stop_is_not_confirmed_while_a_start_that_came_late_runs_the_motor() {
                 break;
             }
             assert!(!runs(&mut rig).await, "{family}, {exchanges}");
+        }
+    }
+}
+
+/// The words of one status are of different moments where it takes more than one exchange: an Altivar 21 was told at rest at its full
+/// speed.
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_is_let_coast_or_trips_between_any_two_exchanges_behind_its_stop_is_not_told_at_rest() {
+    for family in Family::BUILT_IN {
+        let lets_go = family.capabilities().stop_modes.contains(&StopMode::Freewheel);
+        for (mode, trips) in [(StopMode::Freewheel, false), (StopMode::Ramp, true)] {
+            for late in 0..20 {
+                if mode == StopMode::Freewheel && !lets_go {
+                    break;
+                }
+                let (rig, mut drive, port) = ready(family).await;
+                drive.start(Direction::Forward).await.expect("it starts");
+                let end = Instant::now() + A_RAMP;
+                while Instant::now() < end {
+                    drive.status().await.expect("it answers");
+                    sleep(Duration::from_millis(100)).await;
+                }
+                let machine = rig.machine.clone();
+                let trip = move || {
+                    if trips {
+                        machine.trip(drives::a_trip(family));
+                    }
+                };
+                port.after(0, Event::Slow(late, Box::new(trip)));
+                let mut told = drive.stop(mode).await.map(|stopped| stopped.status);
+                for _ in 0..40 {
+                    let Ok(status) = &told else { panic!("{family}, {mode}, {late}: {told:?}") };
+                    let against = contradiction(status, &rig.machine.observe());
+                    assert_eq!(against, None, "{family}, {mode}, {late}");
+                    sleep(Duration::from_millis(100)).await;
+                    told = drive.status().await;
+                }
+                assert!(!port.keeps(), "{family}, {mode}, {late}");
+            }
         }
     }
 }

@@ -21,6 +21,18 @@ pub enum Event {
     Stop(Box<dyn Drive>, StopMode),
     /// This request comes, which the way to the drive had kept back.
     Late(Request<'static>),
+    /// The drive answers the write that this is, and carries it out when so many more exchanges have passed; then this comes.
+    Slow(usize, Deed),
+}
+
+/// What somebody does beside the line.
+pub type Deed = Box<dyn FnOnce() + Send>;
+
+/// What is carried out late.
+struct Kept {
+    left: usize,
+    write: Request<'static>,
+    deed: Deed,
 }
 
 /// When, counted in exchanges from now on.
@@ -46,13 +58,14 @@ pub struct Happened {
 pub struct Interrupted {
     line: drive_bus::Slave,
     plan: Arc<Mutex<Plan>>,
+    kept: Arc<Mutex<Option<Kept>>>,
 }
 
 impl Interrupted {
     /// A port on which nothing happens yet.
     #[must_use]
     pub fn new(line: drive_bus::Slave) -> Self {
-        Self { line, plan: Arc::default() }
+        Self { line, plan: Arc::default(), kept: Arc::default() }
     }
 
     /// Lets this happen when so many more exchanges have passed.
@@ -67,6 +80,24 @@ impl Interrupted {
 
     fn set(&self, plan: Plan) -> Plan {
         std::mem::replace(&mut *self.plan.lock().unwrap_or_else(PoisonError::into_inner), plan)
+    }
+
+    /// What is carried out in front of this exchange.
+    fn kept_until_now(&self) -> Option<Kept> {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        match kept.as_mut() {
+            Some(Kept { left, .. }) if *left > 0 => {
+                *left -= 1;
+                None
+            }
+            _ => kept.take(),
+        }
+    }
+
+    /// Whether something is still to be carried out.
+    #[must_use]
+    pub fn keeps(&self) -> bool {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 
     /// What happens in front of this exchange. What lasts happens in front of the next one, too.
@@ -104,8 +135,26 @@ impl SlaveContext for Interrupted {
 #[async_trait]
 impl Client for Interrupted {
     async fn call(&mut self, request: Request<'_>) -> tokio_modbus::Result<Response> {
+        if let Some(Kept { write, deed, .. }) = self.kept_until_now() {
+            self.line.call(write).await.expect("it answers").expect("it takes it");
+            deed();
+        }
         match self.due(&request) {
             None => {}
+            Some(Event::Slow(left, deed)) => {
+                let (answer, write) = match &request {
+                    Request::WriteSingleRegister(at, word) => {
+                        (Response::WriteSingleRegister(*at, *word), Request::WriteSingleRegister(*at, *word))
+                    }
+                    Request::WriteMultipleRegisters(at, words) => (
+                        Response::WriteMultipleRegisters(*at, u16::try_from(words.len()).expect("a few")),
+                        Request::WriteMultipleRegisters(*at, words.to_vec().into()),
+                    ),
+                    other => panic!("no write: {other:?}"),
+                };
+                *self.kept.lock().unwrap_or_else(PoisonError::into_inner) = Some(Kept { left, write, deed });
+                return Ok(Ok(answer));
+            }
             Some(Event::Expiry) => {
                 return Err(tokio_modbus::Error::Transport(PortError::Expired.into_io()));
             }
