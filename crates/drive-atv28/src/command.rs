@@ -147,7 +147,11 @@ impl<P: Port> Drivecom for Atv28<P> {
 
     async fn shows_run(&mut self, word: u16, status: &mut Status) -> Result<RunShown> {
         let words = FastWords::of_raw(&status.raw);
-        let in_force = self.follows(&words).await?;
+        let follows = self.follows(&words).await?;
+        let in_force = match follows {
+            Some((at, lfrd)) if at == LFRD.address() && self.frh_lags(&words, lfrd).await? => None,
+            followed => followed,
+        };
         // The last thing that is read: a stop of somebody else that came before shows in it.
         let held = self.read_control().await?;
         *status = self.status_of(&words);

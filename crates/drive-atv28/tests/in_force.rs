@@ -191,3 +191,26 @@ async fn a_start_at_a_reference_that_stands_above_the_high_speed_is_told_at_that
     let started = drive.start(Direction::Forward).await.unwrap();
     assert_eq!(started.reference, Some(Frequency::from_hertz(50)));
 }
+
+/// FrH is a word that monitors: it shows another reference only some readings after the drive follows that, as FRHD says at once. 1500 rpm are
+/// SMAL, of 50 Hz, HSP.
+#[tokio::test(start_paused = true)]
+async fn a_start_is_confirmed_at_its_setpoint_and_not_at_the_reference_that_frh_still_shows() {
+    const SPEEDS: [(u16, u16); 3] = [(603, 900), (604, 900), (608, 1_500)];
+    for before in [0, 400] {
+        let mut words = Words::new(&CAPABILITIES, &[&STANDS[..], &RUNS, &SPEEDS, &[(450, before)]].concat());
+        words.lags = Some((450, 300, 4));
+        let mut drive = Atv28::new(words, 1.try_into().unwrap());
+        let started = drive.start(Direction::Forward).await.unwrap();
+        assert_eq!(started.reference, Some(Frequency::from_hertz(30)), "{before}");
+    }
+    // One that was asked for in rpm, LFr being of before, is seen in force at once.
+    let begun = tokio::time::Instant::now();
+    let mut drive = drive(&[&STANDS[..], &RUNS, &SPEEDS, &[(401, 100)]]);
+    drive.start(Direction::Forward).await.unwrap();
+    assert!(begun.elapsed() < std::time::Duration::from_millis(100), "{:?}", begun.elapsed());
+    // Whatever FrH is for good, the drive follows the bus.
+    let mut drive = self::drive(&[&STANDS[..], &RUNS, &SPEEDS, &[(450, 200)]]);
+    let started = drive.start(Direction::Forward).await.unwrap();
+    assert_eq!(started.reference, Some(Frequency::from_hertz(20)));
+}

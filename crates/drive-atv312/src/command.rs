@@ -287,7 +287,8 @@ impl<P: Port> Drivecom for Atv312<P> {
         let mut in_force = (LFR.address(), controls.reference);
         if !follows {
             let (lfrd, by_speed) = self.follows_speed().await?;
-            (follows, in_force) = (by_speed, (LFRD.address(), lfrd));
+            follows = by_speed && !self.frh_lags(&words, lfrd).await?;
+            in_force = (LFRD.address(), lfrd);
             // The last thing that is read: a stop of somebody else that came before shows in it.
             controls = self.read_controls(Class::Command).await?;
         }

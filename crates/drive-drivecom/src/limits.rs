@@ -25,6 +25,17 @@ pub const fn follows_speed(frhd: u16, lfrd: u16) -> bool {
     asked != 0 && follows.abs_diff(asked) <= SPEED_STEP
 }
 
+/// Whether the reference before the ramp, `FrH`, is this speed, by the high limit that the drive tells in both units: `HSP`, and `SMAL` in
+/// rpm. Of a drive that tells none it is not known to be.
+#[must_use]
+pub fn is_speed(frh: Frequency, speed: u16, (hsp, smal): (Frequency, Speed)) -> bool {
+    let [frh, hsp] = [frh, hsp].map(|frequency| u64::from(frequency.centihertz()));
+    let [speed, smal] = [u64::from(speed.cast_signed().unsigned_abs()), u64::from(smal.rpm())];
+    // One is what the reference of the bus and its image at the ramp differ by, another what both units do.
+    let step = 2 * u64::from(SPEED_STEP) * hsp + u64::from(FRH_STEP) * smal;
+    hsp != 0 && smal != 0 && (frh * smal).abs_diff(speed * hsp) <= step
+}
+
 /// Reads `SMIL` and `SMAL`, which are `LSP` and `HSP` in rpm: four words from `smil` on, each limit with its low word
 /// first (BBV51701 p. 18).
 ///
@@ -65,6 +76,17 @@ mod tests {
         assert!(follows_speed((-898_i16).cast_unsigned(), 900));
         assert!(!follows_speed(300, 900));
         assert!(!follows_speed(0, 0));
+    }
+
+    #[test]
+    fn a_frequency_is_known_to_be_a_speed_by_the_high_limit_alone() {
+        let hertz = Frequency::from_hertz;
+        let high = (hertz(50), Speed::from_rpm(1_420));
+        assert!(is_speed(hertz(20), 568, high) && is_speed(hertz(20), (-566_i16).cast_unsigned(), high));
+        assert!(!is_speed(hertz(0), 568, high), "it was at rest before");
+        assert!(!is_speed(hertz(40), 284, high), "that of before");
+        assert!(!is_speed(hertz(20), 568, (hertz(50), Speed::from_rpm(0))));
+        assert!(!is_speed(hertz(0), 0, (hertz(0), Speed::from_rpm(0))));
     }
 
     #[test]

@@ -15,6 +15,9 @@ use drive_core::{Direction, ErrorKind, Frequency, Ground, Lease, Motion, Output,
 /// change them.
 const LIMITS_HOLD: Duration = Duration::from_secs(10);
 
+/// How long `FrH`, a word that monitors, may take to show the reference that the drive follows already: no manual prints a time.
+const SHOWN_WITHIN: Duration = Duration::from_secs(1);
+
 /// How many setpoints are kept of which nobody has seen whether they arrived, until one is confirmed; the oldest goes first.
 const MAY_STAND: usize = 8;
 
@@ -61,6 +64,8 @@ pub struct Proof<L> {
     looked: Vec<L>,
     /// The looks that were taken since the reference is not told to be the bus's, behind whatever words; `None`: it is.
     since_elsewhere: Option<Vec<L>>,
+    /// Since when `FrH` is another reference than the one that is followed, behind the control word that was written last.
+    lags_since: Option<Instant>,
     /// The status before showed the reaction to a fault.
     reacted: bool,
 }
@@ -79,6 +84,7 @@ impl<L> Default for Proof<L> {
             question: None,
             looked: Vec::new(),
             since_elsewhere: None,
+            lags_since: None,
             reacted: false,
         }
     }
@@ -116,7 +122,13 @@ impl<L: Copy + PartialEq> Proof<L> {
     /// A control word is about to be written: what the drive holds is not known until it has confirmed it.
     pub const fn is_writing(&mut self, word: u16) {
         self.watch.run.sends(word);
-        self.held = None;
+        (self.held, self.lags_since) = (None, None);
+    }
+
+    /// `FrH` is another reference than the one that the drive follows, as its speed shows. Whether it may only be late: what it shows then is
+    /// that of before, and a run command in force at that was not confirmed.
+    pub fn frh_may_lag(&mut self) -> bool {
+        self.lags_since.get_or_insert_with(Instant::now).elapsed() < SHOWN_WITHIN
     }
 
     /// The drive has confirmed the control word.

@@ -46,6 +46,8 @@ pub struct Words {
     pub refuses_writes: Option<u8>,
     /// A word that is another at each reading, as that of an analog input is.
     pub wanders: Option<u16>,
+    /// A word that a register is to have, and how many readings of it still find it as it is: one that monitors may be late.
+    pub lags: Option<(u16, u16, u16)>,
     /// What function 08 answers, where that is not its request.
     pub loop_back: Option<Vec<u8>>,
     capabilities: &'static Capabilities,
@@ -64,6 +66,7 @@ impl Words {
             refused: BTreeMap::new(),
             refuses_writes: None,
             wanders: None,
+            lags: None,
             loop_back: None,
             capabilities,
             terms: Terms::default(),
@@ -86,6 +89,12 @@ impl Words {
         let registers = first..first + count;
         if let Some(code) = registers.clone().find_map(|register| self.refused.get(&register)) {
             return Err(ExceptionCode::new(*code));
+        }
+        if let Some((register, word, left)) = self.lags.as_mut().filter(|(at, ..)| registers.contains(at)) {
+            match left.checked_sub(1) {
+                Some(less) => *left = less,
+                None => drop(self.words.insert(*register, *word)),
+            }
         }
         let wanders = self.wanders.filter(|register| registers.contains(register));
         let values = registers.map(|register| self.words.get(&register).copied().unwrap_or(0));
