@@ -120,12 +120,17 @@ impl<P: Port> Drive for Atv312<P> {
         self.registers.at(Class::KeepAlive).read(ETA).await.map(|_| ())
     }
 
+    /// Refused while the input of `InH` is closed, which inhibits the fault that it would trip by.
     async fn watchdog(&mut self) -> Result<Watchdog> {
-        self.read_watchdog().await
+        let watchdog = self.read_watchdog().await?;
+        if watchdog.timeout.is_some() {
+            self.refuse_inhibited().await?;
+        }
+        Ok(watchdog)
     }
 
     /// Sets `ttO` and `SLL`, with the motor stopped, and clears the NTO bit. The drive is left in "switch on disabled"
-    /// when one of the two was changed.
+    /// when one of the two was changed. Refused while the input of `InH` is closed.
     async fn arm_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
         self.set_watchdog(timeout, reaction).await
     }

@@ -11,8 +11,10 @@ use drive_drivecom::ChartState;
 
 use crate::{
     Atv312,
-    registers::{ADC, CFG, CMD, CMDD, CMI, ETI, FCS, LAC, LFR, LFRD, RP, RPR, SCS, SLL, TTO, TUN, address},
-    settings::Known,
+    registers::{
+        ADC, CFG, CMD, CMDD, CMI, ETI, FCS, INH, IOLR, LAC, LFR, LFRD, RP, RPR, SCS, SLL, TTO, TUN, address,
+    },
+    settings::{Known, LI1},
     words::{ControlWord, ExtendedControl, ExtendedStatus},
 };
 
@@ -219,8 +221,32 @@ impl<P: Port> Atv312<P> {
         Ok(Watchdog { timeout: (!off).then(|| STEP * u32::from(timeout)), reaction: Some(reaction) })
     }
 
-    /// Sets the three, reads them back and compares.
+    /// Refuses a watchdog that could not act, because an input takes from the drive all faults that it would trip by, this one among them.
+    pub(crate) async fn refuse_inhibited(&mut self) -> Result<()> {
+        const INHIBITED: Refusal = Refusal::Settings(
+            "a closed input inhibits every fault of the drive, that of its watchdog too (InH, p. 54): open it, or set InH to nO",
+        );
+        let absent = &mut self.known.absent;
+        let inhibits = absent.word(&mut self.registers.at(Class::Background), INH.address()).await?;
+        self.known.inhibits = inhibits.and_then(|source| source.checked_sub(LI1)).filter(|&input| input < 6);
+        self.proof.watch.knows(INH.address(), inhibits.unwrap_or(0));
+        let is_closed = match self.known.inhibits {
+            Some(input) => self.registers.at(Class::Background).read(IOLR).await? >> input & 1 == 1,
+            None => false,
+        };
+        self.proof.watch.knows(IOLR.address(), is_closed.into());
+        if is_closed { Err(self.refused(Command::ArmWatchdog, INHIBITED)) } else { Ok(()) }
+    }
+
+    /// Sets the three, reads them back and compares, where the watchdog can act.
     pub(crate) async fn set_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
+        if reaction != Reaction::Ignore {
+            self.refuse_inhibited().await?;
+        }
+        self.write_watchdog(timeout, reaction).await
+    }
+
+    async fn write_watchdog(&mut self, timeout: Duration, reaction: Reaction) -> Result<Watchdog> {
         if let Some(reason) = self.refuses_writes() {
             return Err(self.refused(Command::ArmWatchdog, reason));
         }
@@ -262,7 +288,7 @@ impl<P: Port> Atv312<P> {
     pub(crate) async fn put_back_watchdog(&mut self, found: Watchdog) -> Result<Watchdog> {
         let timeout = found.timeout.unwrap_or(WATCHDOG.max);
         let reaction = found.reaction.unwrap_or(Reaction::Ignore);
-        let set = self.set_watchdog(timeout, reaction).await?;
+        let set = self.write_watchdog(timeout, reaction).await?;
         if set == found || found.timeout.is_some() {
             return Ok(set);
         }

@@ -10,12 +10,12 @@ use crate::{
     Atv312,
     facts::{ANALOG_INPUTS, BEYOND_LIMIT, Facts, OTHER_REFERENCE},
     reading::{FastWords, Resolution},
-    registers::{ADC, AI1C, CMI, FRH, IOLR, LFR, LFRD, LRS3, RFR, SLL, TTO},
+    registers::{ADC, AI1C, CMI, FRH, INH, IOLR, LFR, LFRD, LRS3, RFR, SLL, TTO},
     words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, ExtendedStatus3},
 };
 
-/// What has its turn besides the settings' blocks: the limits, `ttO`, `SLL`, the two ramps.
-const TURNS: usize = 5;
+/// What has its turn besides the settings' blocks: the limits, `ttO`, `SLL`, what inhibits faults, the two ramps.
+const TURNS: usize = 6;
 
 /// A further exchange behind a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,8 +71,12 @@ impl<P: Port> Atv312<P> {
     }
 
     const fn turn_count(&self) -> usize {
-        // The control word and what stands beside it every other time.
-        if self.proof.watch.is_kept() { 2 * (TURNS + self.known.settings.blocks()) } else { 0 }
+        if self.proof.watch.is_kept() { self.beat() * (TURNS + self.known.settings.blocks()) } else { 0 }
+    }
+
+    /// The control word and what stands beside it every other time, or every third where an input may inhibit faults, which has as many.
+    const fn beat(&self) -> usize {
+        if self.known.inhibits.is_some() { 3 } else { 2 }
     }
 
     fn wanted(&self, words: &FastWords, status: &Status) -> [(Look, bool); 8] {
@@ -116,8 +120,9 @@ impl<P: Port> Atv312<P> {
             }
             Look::Setting => self.read_a_setting(class).await,
             Look::Ramp => self.read_ramp(class).await?,
-            Look::Turn(turn) if turn % 2 == 0 => self.read_controls(class).await.map(drop)?,
-            Look::Turn(turn) => match turn / 2 {
+            Look::Turn(turn) if turn % self.beat() == 0 => self.read_controls(class).await.map(drop)?,
+            Look::Turn(turn) if turn % self.beat() == 2 => self.read_inhibition(class).await?,
+            Look::Turn(turn) => match turn / self.beat() {
                 0 => self.read_frequency_limits(class).await.map(drop)?,
                 1 => {
                     let word = self.registers.at(class).read(TTO).await?;
@@ -127,8 +132,9 @@ impl<P: Port> Atv312<P> {
                     let word = self.registers.at(class).read(SLL).await?;
                     self.proof.watch.finds(SLL.address(), word, Ground::Watchdog);
                 }
-                3 => self.read_second_ramp(class).await?,
-                4 => self.read_ramp_time(class).await?,
+                3 => self.read_inhibition(class).await?,
+                4 => self.read_second_ramp(class).await?,
+                5 => self.read_ramp_time(class).await?,
                 block => self.read_setting_again(class, block - TURNS).await?,
             },
         }
@@ -136,6 +142,19 @@ impl<P: Port> Atv312<P> {
         if !matches!(look, Look::Setting | Look::Ramp) {
             self.proof.looked(look);
         }
+        Ok(())
+    }
+
+    /// The input that inhibits every fault, or, where none does, whether one is assigned to that by now.
+    async fn read_inhibition(&mut self, class: Class) -> Result<(), Error> {
+        let (register, word) = match self.known.inhibits {
+            Some(input) => (IOLR.address(), self.registers.at(class).read(IOLR).await? >> input & 1),
+            None => {
+                let inhibits = self.known.absent.word(&mut self.registers.at(class), INH.address()).await?;
+                (INH.address(), inhibits.unwrap_or(0))
+            }
+        };
+        self.proof.watch.finds(register, word, Ground::Watchdog);
         Ok(())
     }
 

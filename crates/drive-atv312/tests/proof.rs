@@ -64,6 +64,38 @@ async fn bit_9_of_cmi_a_changed_watchdog_and_lowered_limits_are_seen_in_their_ti
     assert!(matches!(error, Error::Setpoint { .. }), "{error}");
 }
 
+/// InH on LI6 (BBV51701 p. 54): while it is closed the drive has no faults, SLF among them, and its motor goes on without its line.
+#[tokio::test(start_paused = true)]
+async fn a_watchdog_whose_fault_an_input_inhibits_is_neither_found_nor_set_up() {
+    const LI6: u16 = 1 << 5;
+    let (mut drive, machine, _line) = running().await;
+    drive.stop(StopMode::Ramp).await.unwrap();
+    machine.wait_until(|seen| !seen.running).await;
+    let armed = drive.arm_watchdog(Duration::from_secs(5), Reaction::Ramp).await.unwrap();
+    assert!(machine.poke(row("InH").address, 134));
+    assert_eq!(drive.watchdog().await.unwrap(), armed, "assigned, and open");
+    drive.start(Direction::Forward).await.unwrap();
+    assert!(machine.poke(row("IOLR").address, LI6));
+    let mut found = None;
+    for _ in 0..3 * STATUSES_PER_TURN {
+        drive.status().await.unwrap();
+        found = found.or(drive.take_changed());
+    }
+    assert_eq!(found, Some(Ground::Watchdog), "the motor turns");
+    let named = |error: Error| error.to_string().contains("InH");
+    assert!(named(drive.watchdog().await.unwrap_err()));
+    drive.stop(StopMode::Ramp).await.unwrap();
+    machine.wait_until(|seen| !seen.running).await;
+    let before = bench::writes(&machine);
+    assert!(named(drive.arm_watchdog(Duration::from_secs(2), Reaction::Ramp).await.unwrap_err()));
+    assert_eq!(bench::writes(&machine), before);
+    // What was found is put back all the same.
+    let off = drive_core::Watchdog { timeout: None, reaction: Some(Reaction::Ignore) };
+    drive.restore_watchdog(off).await.unwrap();
+    assert!(machine.poke(row("IOLR").address, 0));
+    drive.arm_watchdog(Duration::from_secs(2), Reaction::Ramp).await.unwrap();
+}
+
 /// p. 20: the same word is another frequency then, and nobody has asked for that one.
 #[tokio::test(start_paused = true)]
 async fn a_motor_whose_reference_another_master_counts_otherwise_is_not_in_force_until_its_setpoint_is_given_again()

@@ -35,7 +35,7 @@ const CD11: u16 = 171;
 /// C111, bit 11 of the Modbus control word, in `rFC` and `CCS`; C112 to C115 follow.
 const C111: u16 = 187;
 /// LI1 in every assignment; LI2 to LI6 follow.
-const LI1: u16 = 129;
+pub(crate) const LI1: u16 = 129;
 /// Cd13: bit 13 in the functions' assignments.
 pub(crate) const CD13: u16 = CD11 + 2;
 /// Cd14.
@@ -111,6 +111,8 @@ pub(crate) struct Known {
     /// The registers that this drive lacks.
     pub(crate) absent: Absent,
     pub(crate) speeds: Option<(Speed, Speed)>,
+    /// The input that inhibits every fault, by `InH`, as it was read with the watchdog.
+    pub(crate) inhibits: Option<u16>,
     /// Whether a status was read since, so that the next one has time for a setting.
     pub(crate) seen: bool,
 }

@@ -246,6 +246,7 @@ export const SENTENCES_FR = {
   'the access level is none that the manual lists: set LAC to L1, L2 or L3': 'le niveau d’accès n’est pas de ceux du manuel : régler LAC sur L1, L2 ou L3',
   'the drive checks no consistency and is locked on standstill (CMI bit 15): clear that bit': 'le variateur ne contrôle pas la cohérence et est verrouillé à l’arrêt (CMI bit 15) : remettre ce bit à 0',
   'the drive is locked on standstill (CMI bit 13): clear that bit': 'le variateur est verrouillé à l’arrêt (CMI bit 13) : remettre ce bit à 0',
+  'a closed input inhibits every fault of the drive, that of its watchdog too (InH, p. 54): open it, or set InH to nO': 'une entrée fermée inhibe tous les défauts du variateur, celui de son chien de garde aussi (InH, p. 54) : l’ouvrir, ou régler InH sur nO',
   'the drive is saving its parameters to EEPROM (ETI bit 0): try again in a moment': 'le variateur enregistre ses paramètres en EEPROM (ETI bit 0) : réessayer dans un instant',
   'the reference on the bus is negative: give a setpoint before the start': 'la référence du bus est négative : donner une consigne avant le démarrage',
   'by Atr the drive resets its fault and starts the motor again by itself, for as long as tAr says': 'par Atr le variateur acquitte son défaut et redémarre seul le moteur, aussi longtemps que le dit tAr',
