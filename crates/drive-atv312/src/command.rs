@@ -15,7 +15,7 @@ use crate::{
     Atv312,
     facts::OTHER_REFERENCE,
     reading::{FIRST, FastWords, raw_command},
-    registers::{BLC, BRT, CMD, ETA, IOLR, LFR, LFRD, LFT, RRS, TCC, TCT},
+    registers::{BLC, BRT, CMD, ETA, IOLR, LAF, LFR, LFRD, LFT, RRS, TCC, TCT},
     settings::{Controls, Known},
     words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, StatusWord},
 };
@@ -182,6 +182,21 @@ impl<P: Port> Atv312<P> {
         Ok(runs.then_some(ASKED))
     }
 
+    /// A limit switch, where one is assigned and the motor does not turn although its reference asks for it. At which level a switch stops it
+    /// is not printed (p. 50).
+    async fn limit_switch(&mut self, words: StatusWords) -> Option<Refusal> {
+        const SWITCH: Refusal = Refusal::Overridden {
+            by: "a limit switch, as it seems (LAF or LAr is assigned, and the motor does not turn),",
+            remedy: "see the switches, and start away from the one that is reached",
+        };
+        if words.is_turning() {
+            return None;
+        }
+        let mut calls = self.registers.at(Class::Command);
+        let switches = self.known.absent.read(&mut calls, LAF.address(), 2).await.ok()?;
+        switches.into_iter().flatten().any(|source| source != 0).then_some(SWITCH)
+    }
+
     /// Why nothing but a stop is written to this drive: it has said that it is another one.
     pub(crate) const fn refuses_writes(&self) -> Option<Refusal> {
         match self.known.kind {
@@ -318,6 +333,9 @@ impl<P: Port> Drivecom for Atv312<P> {
         }
         let controls = self.read_controls(Class::Command).await.ok()?;
         let other = self.other_reference().await.ok()?;
+        if let (None, Some(reason)) = (other, self.limit_switch(words.state_words()).await) {
+            return Some(reason);
+        }
         let follows = self.follows_frequency(&words, controls.reference).await.ok()?
             || self.follows_speed().await.ok()?.1;
         other.or((!follows).then_some(OTHER_REFERENCE))

@@ -42,7 +42,7 @@ impl<P: Port> Drive for Atv312<P> {
     /// W3201 to W3206 in one exchange. Where these words alone do not tell the frequency or whether a run command is in
     /// force, W8501 to W8504 in a second one: the first time for a drive that runs, and while a motor slows down or stands
     /// with a run command. The statuses behind the first, of a motor that runs, read one setting each until a
-    /// [`stop`](Self::stop) needs no reading: 8 blocks, 16 at access level L3, 18 where a bit switches the command channel.
+    /// [`stop`](Self::stop) needs no reading: 9 blocks, 17 at access level L3, 19 where a bit switches the command channel.
     /// A start, a setpoint and [`self_restarts`](Self::self_restarts) read all that are missing.
     async fn status(&mut self) -> Result<Status> {
         self.watch().await

@@ -26,6 +26,8 @@ pub(crate) struct Facts {
     pub(crate) inputs: Option<u16>,
     /// Whether the second reference is selected.
     pub(crate) second: Option<bool>,
+    /// Whether the 4-20 mA are lost.
+    pub(crate) lost: Option<bool>,
     /// The analog inputs.
     pub(crate) analog: Option<[u16; 3]>,
 }

@@ -10,8 +10,8 @@ use crate::{
     Atv312,
     facts::{ANALOG_INPUTS, BEYOND_LIMIT, Facts, OTHER_REFERENCE},
     reading::{FastWords, Resolution},
-    registers::{ADC, AI1C, CMI, FRH, INH, IOLR, LFR, LFRD, LRS3, RFR, SLL, TTO},
-    words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, ExtendedStatus3},
+    registers::{ADC, AI1C, CMI, FRH, INH, IOLR, LFR, LFRD, LRS1, LRS3, RFR, SLL, TTO},
+    words::{AccessLevel, ControlWord, ExtendedControl, ExtendedStatus, ExtendedStatus1, ExtendedStatus3},
 };
 
 /// What has its turn besides the settings' blocks: the limits, `ttO`, `SLL`, what inhibits faults, the two ramps.
@@ -32,6 +32,8 @@ pub(crate) enum Look {
     Selection,
     /// `AI1C` to `AI3C`.
     Analog,
+    /// `LRS1`.
+    Signal,
     /// A block of the settings that is not known yet.
     Setting,
     /// What is not known yet of the ramp.
@@ -79,7 +81,7 @@ impl<P: Port> Atv312<P> {
         if self.known.inhibits.is_some() { 3 } else { 2 }
     }
 
-    fn wanted(&self, words: &FastWords, status: &Status) -> [(Look, bool); 8] {
+    fn wanted(&self, words: &FastWords, status: &Status) -> [(Look, bool); 9] {
         let settings = &self.known.settings;
         let evidence = self.evidence(words);
         let elsewhere = evidence.is_some() && self.told_reference(words) != Told::Yes;
@@ -96,6 +98,7 @@ impl<P: Port> Atv312<P> {
             (Look::Selection, elsewhere && switched),
             (Look::Inputs, elsewhere && settings.has_presets() || blocked && settings.has_stop_inputs()),
             (Look::Analog, elsewhere && sums),
+            (Look::Signal, elsewhere && settings.falls_back()),
             (Look::Setting, learns),
             (Look::Ramp, evidence.is_some() && self.known.ramp.can_learn()),
         ]
@@ -117,6 +120,10 @@ impl<P: Port> Atv312<P> {
             }
             Look::Analog => {
                 self.facts.analog = Some(self.registers.at(class).read_array(AI1C.address()).await?);
+            }
+            Look::Signal => {
+                let lrs1 = ExtendedStatus1::from_bits_retain(self.registers.at(class).read(LRS1).await?);
+                self.facts.lost = Some(lrs1.contains(ExtendedStatus1::SIGNAL_LOST));
             }
             Look::Setting => self.read_a_setting(class).await,
             Look::Ramp => self.read_ramp(class).await?,

@@ -115,8 +115,16 @@ impl FastWords {
 
     /// Why a setting cannot be changed now.
     pub(crate) fn refuses_settings(&self) -> Option<Refusal> {
+        const HELD: Refusal = Refusal::Settings(
+            "direct current is injected into the motor (ETI bit 5): let it end, or disable operation first by a freewheel stop",
+        );
         let words = self.state_words();
-        if words.is_driving() { Some(Refusal::MotorRunning) } else { self.refuses_while_saving() }
+        // Under current no word says whether the shaft still turns: but it is not run.
+        match words.is_driving() {
+            true if words.eti.contains(ExtendedStatus::DC_INJECTION) => Some(HELD),
+            true => Some(Refusal::MotorRunning),
+            false => self.refuses_while_saving(),
+        }
     }
 
     /// Why no parameter is written now (p. 20, 22), and nothing is started.

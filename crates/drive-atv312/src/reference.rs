@@ -7,8 +7,8 @@ use crate::{
     Atv312,
     facts::{ANALOG_INPUTS, Facts},
     reading::FastWords,
-    registers::{AI1C, IOLR, LFRD, LRS3},
-    words::{AccessLevel, ExtendedStatus3},
+    registers::{AI1C, IOLR, LFRD, LRS1, LRS3},
+    words::{AccessLevel, ExtendedStatus1, ExtendedStatus3},
 };
 
 impl<P: Port> Atv312<P> {
@@ -53,6 +53,10 @@ impl<P: Port> Atv312<P> {
         // What the settings say is enough where they say it.
         if let Some(reason) = settings.refuses_reference() {
             return Ok(Some(reason));
+        }
+        if settings.falls_back() {
+            let lrs1 = ExtendedStatus1::from_bits_retain(calls.read(LRS1).await?);
+            facts.lost = Some(lrs1.contains(ExtendedStatus1::SIGNAL_LOST));
         }
         if settings.has_presets() {
             facts.inputs = Some(calls.read(IOLR).await?);

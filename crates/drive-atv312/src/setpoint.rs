@@ -68,8 +68,15 @@ impl<P: Port> Atv312<P> {
                 Some(asked) => follows_frequency(words.reference(), asked, self.frequency_limits().await?),
                 None => self.follows_speed().await?.1,
             };
-            if follows {
+            if follows && !self.known.settings.falls_back() {
                 return Ok(());
+            }
+            if follows {
+                let held = self.proof.held().unwrap_or(0);
+                return match self.judge_reference(held).await? {
+                    None => Ok(()),
+                    because => Err(self.not_confirmed(Command::Setpoint(setpoint), status, because)),
+                };
             }
             if running && confirming.again().await {
                 continue;

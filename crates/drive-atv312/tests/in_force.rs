@@ -196,7 +196,7 @@ async fn a_status_at_rest_is_one_exchange_and_of_a_motor_that_runs_two_until_its
         Asked::Read(Class::Status, CMD, 4),
         "the resolution, and whether a run command is in force"
     );
-    assert_eq!(asked.len(), 30 + 1 + 16, "each block once");
+    assert_eq!(asked.len(), 30 + 1 + 17, "each block once");
     assert!(asked.windows(2).all(|pair| pair.iter().any(is_status)), "never two behind one status");
 }
 
@@ -260,6 +260,8 @@ async fn a_start_is_confirmed_only_by_the_reference_of_the_bus() {
 async fn a_start_at_which_something_else_would_decide_the_speed_is_refused_with_its_name() {
     for (settings, by) in [
         (&[(11901, 1)][..], "PIF"),
+        // LFL = LFF, and bit 12 of LRS1: the 4-20 mA are lost (p. 22, 54).
+        (&[(7003, 4), (3250, 1 << 12)], "LFL"),
         (&[(8411, 97), (8414, 1)], "Fr2"),
         (&[(8413, 1)], "Fr1"),
         // rFC by LI5, which has selected Fr2 = AI1: LRS3 bit 0.
@@ -282,7 +284,7 @@ async fn a_start_at_which_something_else_would_decide_the_speed_is_refused_with_
         assert!(commands(drive).is_empty(), "{by}");
     }
     // Assigned and silent: nothing decides instead.
-    let silent = [(11401, 131), (11801, 2), (5243, 3), (8411, 133)];
+    let silent = [(11401, 131), (11801, 2), (5243, 3), (8411, 133), (7003, 5)];
     let mut drive = drive(&[&FOR_THE_BUS, &RUNS, &silent]);
     drive.start(Direction::Forward).await.unwrap();
     drive.set_setpoint(THIRTY).await.unwrap();
@@ -295,6 +297,33 @@ async fn a_setpoint_to_a_running_motor_is_confirmed_by_frh() {
     let error = drive.set_setpoint(Frequency::from_hertz(20).into()).await.unwrap_err();
     assert_eq!(error.kind(), ErrorKind::NotConfirmed, "these words do not follow");
     assert!(overridden_by(&error, "FrH"), "{error}");
+    // LFL = rLS and the 4-20 mA are lost (p. 22, 54): the motor keeps its speed, and FrH may be the reference of the bus all the same.
+    let mut drive = self::drive(&[&FOR_THE_BUS, &RUNS, &[(7003, 5), (3250, 1 << 12)]]);
+    let error = drive.set_setpoint(THIRTY).await.unwrap_err();
+    assert!(error.kind() == ErrorKind::NotConfirmed && overridden_by(&error, "LFL"), "{error}");
+}
+
+/// LAF on LI5 (p. 50).
+#[tokio::test(start_paused = true)]
+async fn a_start_towards_a_limit_switch_that_keeps_the_motor_from_turning_names_it() {
+    let enabled = [(3201, 0x0627), (3203, 300), (3206, 0x4002)];
+    for (switch, is_named) in [(0, false), (133, true)] {
+        let mut drive = drive(&[&FOR_THE_BUS, &enabled, &[(11601, switch)]]);
+        let error = drive.start(Direction::Forward).await.unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::NotConfirmed, "{error}");
+        assert_eq!(overridden_by(&error, "limit switch"), is_named, "{error}");
+    }
+}
+
+/// AdC (p. 41) holds the motor; nothing has it run.
+#[tokio::test(start_paused = true)]
+async fn what_is_refused_while_direct_current_flows_does_not_say_that_the_motor_runs() {
+    let mut drive = drive(&[&FOR_THE_BUS, &[(3201, 0x0627), (3206, 0x4022), (CMD, 0x100F)]]);
+    let error = drive.release().await.unwrap_err();
+    assert!(
+        matches!(because(&error), Some(Refusal::Settings(why)) if why.contains("direct current")),
+        "{error}"
+    );
 }
 
 #[tokio::test(start_paused = true)]
@@ -459,11 +488,12 @@ async fn whatever_setting_was_learnt_is_read_again_in_its_turn() {
 /// What somebody at the keypad may have set otherwise while the motor stood: all that is read but AdC, which decides nothing of a start.
 #[tokio::test(start_paused = true)]
 async fn each_start_reads_anew_all_that_decides_what_it_does() {
-    // LAC, CCS, rFC, Fr1, Stt, rPS, LC2, EtF, CHP, Pr2, PS2, SA2, PIF, JOG, Atr; below L3 those that count there.
-    let at_l3 =
-        [3006, 8421, 8411, 8413, 11201, 9010, 9202, 7131, 8011, 11909, 11401, 11801, 11901, 11110, 7122];
-    let below = [3006, 11201, 11401, 11801, 11901, 11110, 7122];
-    for (settings, read, blocks) in [(&[][..], &at_l3[..], 15), (&[(3006, 0)], &below[..], 7)] {
+    // LAC, CCS, rFC, Fr1, Stt, rPS, LC2, EtF, CHP, Pr2, PS2, SA2, PIF, JOG, Atr, LFL; below L3 those that count there.
+    let at_l3 = [
+        3006, 8421, 8411, 8413, 11201, 9010, 9202, 7131, 8011, 11909, 11401, 11801, 11901, 11110, 7122, 7003,
+    ];
+    let below = [3006, 11201, 11401, 11801, 11901, 11110, 7122, 7003];
+    for (settings, read, blocks) in [(&[][..], &at_l3[..], 16), (&[(3006, 0)], &below[..], 8)] {
         let mut drive = watched(&[&FOR_THE_BUS, &RUNS, settings]).await;
         for _ in 0..2 {
             drive.start(Direction::Forward).await.unwrap();

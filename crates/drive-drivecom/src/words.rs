@@ -423,7 +423,7 @@ impl StatusWords {
     /// Whether the motor is driven or may be. A reference of zero asks for nothing.
     fn told_output(self, frh: Frequency) -> Told {
         const STOPPED: Refusal = Refusal::Overridden {
-            by: "a stop at the drive, by an input (FSt, dCI, nSt), a key, or after tLS at low speed,",
+            by: "a stop at the drive, by an input (FSt, dCI, nSt, LAF, LAr), a key, or after tLS at low speed,",
             remedy: "see which one it is, release it, and start again",
         };
         const LOCKED: Refusal = Refusal::Overridden {

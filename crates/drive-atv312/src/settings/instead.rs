@@ -5,7 +5,7 @@ use drive_core::{Refusal, SelfRestart};
 use super::{CD11, LI1, REFERENCE_1, REFERENCE_2, REFERENCE_BY_MODBUS, Settings};
 use crate::{
     facts::{ANALOG_INPUTS, Facts, SILENT},
-    registers::{ATR, DCI, FR1, FR2, FST, NST, PIF, RFC, SA2, SA3, address},
+    registers::{ATR, DCI, FR1, FR2, FST, LFL, NST, PIF, RFC, SA2, SA3, address},
     words::{AccessLevel, ControlWord},
 };
 
@@ -124,6 +124,11 @@ impl Settings {
             by: "a summing input (SA2, AI2 as the drive leaves the factory, or SA3)",
             remedy: "set SA2 and SA3 to nO",
         };
+        // Whether it does so where AI3 gives no reference, the manual leaves open: FrH may be that of the bus all the same.
+        const FALLBACK: Refusal = Refusal::Overridden {
+            by: "the speed to which the drive falls back (LFL), for its 4-20 mA are lost (LRS1 bit 12),",
+            remedy: "see the signal at AI3, or set LFL otherwise than to LFF and rLS",
+        };
         let preset = facts.inputs.and_then(|inputs| self.selected_preset(inputs, held));
         let second = facts.second.unwrap_or_else(|| self.has_second_reference());
         let channel = facts.second.and_then(|second| self.refuses_channel(second));
@@ -140,7 +145,15 @@ impl Settings {
             }
         };
         let summed = (!second && self.summed().iter().any(adds)).then_some(SUMMED);
-        self.refuses_reference().or(preset).or(channel).or(summed)
+        let fallen_back = (facts.lost == Some(true) && self.falls_back()).then_some(FALLBACK);
+        self.refuses_reference().or(fallen_back).or(preset).or(channel).or(summed)
+    }
+
+    /// Whether the drive goes on at another speed when the 4-20 mA are lost, the fallback speed or the one it had (`LFL`, p. 54).
+    pub(crate) fn falls_back(&self) -> bool {
+        const LFF: u16 = 4;
+        const RLS: u16 = 5;
+        [LFF, RLS].contains(&self.word(LFL))
     }
 
     /// What is summed to reference 1.

@@ -76,6 +76,7 @@ const BLOCKS: &[Block] = &[
     (address::PIF, 1, Always),
     (address::JOG, 1, Always),
     (address::ATR, 1, Always),
+    (address::LFL, 1, Always),
     (address::ADC, 1, Always),
 ];
 /// The blocks that say by which bit of the bus the command is switched, if by any: who has the reference has it too unless `CHCF` = SEP.
@@ -83,7 +84,7 @@ const FOR_THE_COMMAND: usize = 4;
 /// The blocks that decide a stop: at L1 and L2, and at L3, where any bit above the chart's may have got another meaning.
 const FOR_A_STOP: (usize, usize) = (7, 13);
 /// The blocks of what takes the place of a reference of the bus, or is added to it, whichever channel gives it.
-const REPLACE_A_REFERENCE: &[u16] = &[address::PS2, address::SA2, address::PIF, address::JOG];
+const REPLACE_A_REFERENCE: &[u16] = &[address::PS2, address::SA2, address::PIF, address::JOG, address::LFL];
 /// The functions that a bit of the control word can be assigned to, besides the stops.
 const FUNCTIONS: [u16; 10] = [
     address::RPS,
