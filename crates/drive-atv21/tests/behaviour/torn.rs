@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use async_trait::async_trait;
 use drive_atv21::Atv21;
 use drive_bus::Slave as Line;
-use drive_core::{Direction, Drive, Motion, Port, StopMode, Terms};
+use drive_core::{Direction, Drive, Motion, Port, State, StopMode, Terms};
 use drive_sim::SimSlave;
 use drive_testing::{bench, truth::Judged};
 use tokio_modbus::{Request, Response, Slave, client::Client, slave::SlaveContext};
@@ -38,20 +38,18 @@ impl SlaveContext for Late {
 #[async_trait]
 impl Client for Late {
     async fn call(&mut self, request: Request<'_>) -> tokio_modbus::Result<Response> {
-        let deed = || self.deed.lock().unwrap().take();
         match request {
             Request::WriteSingleRegister(0xFA00, word) if self.deed.lock().unwrap().is_some() => {
                 self.kept = Some(Request::WriteSingleRegister(0xFA00, word));
                 Ok(Ok(Response::WriteSingleRegister(0xFA00, word)))
             }
-            Request::ReadHoldingRegisters(0xFD01, 1) if self.kept.is_some() => {
+            Request::ReadHoldingRegisters(0xFD01, 1) if self.deed.lock().unwrap().is_some() => {
                 let answer = self.line.call(request).await;
                 if let Some(kept) = self.kept.take() {
                     self.line.call(kept).await.unwrap().unwrap();
                 }
-                if let Some(deed) = deed() {
-                    deed();
-                }
+                let deed = self.deed.lock().unwrap().take();
+                deed.into_iter().for_each(|deed| deed());
                 answer
             }
             request => self.line.call(request).await,
@@ -61,6 +59,22 @@ impl Client for Late {
     async fn disconnect(&mut self) -> std::io::Result<()> {
         Ok(())
     }
+}
+
+/// A motor that was seen to run at 25 Hz for a while, and what is to happen to it.
+async fn running() -> (Rig, Judged<Atv21<Late>>, Arc<Mutex<Option<Deed>>>) {
+    let (rig, _) = Rig::factory();
+    let port = Late { line: rig.line.slave(1), deed: Arc::default(), kept: None };
+    let late = Arc::clone(&port.deed);
+    let mut drive = Judged::new(Atv21::new(port, bench::address(1)), rig.machine.clone());
+    drive.set_coast_time(Some(20 * SECOND));
+    drive.set_setpoint(HALF_SPEED.into()).await.unwrap();
+    drive.start(Direction::Forward).await.unwrap();
+    for _ in 0..100 {
+        drive.status().await.unwrap();
+        tokio::time::sleep(SECOND / 10).await;
+    }
+    (rig, drive, late)
 }
 
 /// It was told at rest for good, at 31 Hz: FD01 was the word of the run command, FD00 was 0 behind it, and that is a ramp at its end.
@@ -74,17 +88,7 @@ async fn a_motor_whose_output_is_cut_between_fd01_and_fd00_of_the_first_look_beh
         ("ST = OFF", StopMode::Ramp, st_opens),
         ("a trip", StopMode::Ramp, trips),
     ] {
-        let (rig, _) = Rig::factory();
-        let port = Late { line: rig.line.slave(1), deed: Arc::default(), kept: None };
-        let late = Arc::clone(&port.deed);
-        let mut drive = Judged::new(Atv21::new(port, bench::address(1)), rig.machine.clone());
-        drive.set_coast_time(Some(20 * SECOND));
-        drive.set_setpoint(HALF_SPEED.into()).await.unwrap();
-        drive.start(Direction::Forward).await.unwrap();
-        for _ in 0..100 {
-            drive.status().await.unwrap();
-            tokio::time::sleep(SECOND / 10).await;
-        }
+        let (rig, mut drive, late) = running().await;
         let machine = rig.machine.clone();
         *late.lock().unwrap() = Some(Box::new(move || deed(&machine)));
         drive.stop(mode).await.unwrap();
@@ -96,4 +100,19 @@ async fn a_motor_whose_output_is_cut_between_fd01_and_fd00_of_the_first_look_beh
         tokio::time::sleep(10 * SECOND).await;
         assert_eq!(drive.status().await.unwrap().motion, Motion::AtRest, "{what}: its coast time is over");
     }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_motor_that_loses_st_between_fd01_and_fd00_of_a_look_at_its_ramp_coasts() {
+    let (rig, mut drive, late) = running().await;
+    rig.machine.reading("FD01.10", "turning").unwrap();
+    drive.stop(StopMode::Ramp).await.unwrap();
+    for _ in 0..5 {
+        assert_eq!(drive.status().await.unwrap().motion, Motion::Braking);
+        tokio::time::sleep(SECOND / 10).await;
+    }
+    let machine = rig.machine.clone();
+    *late.lock().unwrap() = Some(Box::new(move || machine.terminal("ST", false).unwrap()));
+    assert_eq!(drive.status().await.unwrap().state, State::Stopping);
+    assert_eq!(drive.status().await.unwrap().motion, Motion::Coasting);
 }
