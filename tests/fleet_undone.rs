@@ -33,7 +33,7 @@ async fn runs_it(mut drive: Box<dyn Drive>, period: Duration) {
 async fn a_stop_that_another_master_undoes_ends_in_its_time_and_is_an_alarm_unless_the_motor_stands() {
     for family in Family::BUILT_IN {
         let mut undone = 0;
-        for period in [300, 410, 700] {
+        for period in [30, 100, 300, 410, 700] {
             // A witness takes every word of this bus for one of the fleet's.
             let plant = Plant::single(family, |settings| settings.times.standstill = STANDSTILL);
             let mut plant = plant.without_witnesses();
@@ -207,5 +207,47 @@ async fn a_driver_that_calls_a_start_done_while_its_drive_shows_no_run_command_h
         let outcome = motor.start(Direction::Forward).await;
         assert!(matches!(outcome, Outcome::NotConfirmed(_)), "{family}: {outcome}");
         assert!(!site.slave(ADDRESS).expect("it is there").observe().running);
+    }
+}
+
+/// The cable is cut while a motor comes down along its ramp, and joined again: nobody has started it, and its ramp goes on.
+#[tokio::test(start_paused = true)]
+async fn a_ramp_on_which_the_line_was_away_goes_on_and_nobody_is_blamed_for_it() {
+    for (family, away) in Family::BUILT_IN.into_iter().flat_map(|family| [(family, 1_500), (family, 4_000)]) {
+        let plant = Plant::single(family, |settings| settings.watchdog = None);
+        let machine = plant.machine().clone();
+        let ramp = [
+            (Family::ATV21, "set DEC 300"),
+            (Family::ATV58, "set W253 300"),
+            (Family::OMRON_3G3EV, "set n20 30"),
+        ];
+        let ramp = ramp.iter().find(|(of, _)| *of == family).map_or("set dEC 300", |(_, ramp)| ramp);
+        plant.happens(ramp);
+        plant.run_at(40).await;
+        let motor = plant.motor();
+        let stop = motor.stop(StopMode::Ramp);
+        sleep(1_000 * MS).await;
+        plant.happens("line cut");
+        sleep(away * MS).await;
+        let before = Plant::writes(&machine);
+        plant.happens("line join");
+        let outcome = timeout(PATIENCE, async {
+            let mut watch = motor.watch();
+            let mut stop = std::pin::pin!(stop.finished());
+            loop {
+                tokio::select! {
+                    outcome = &mut stop => return outcome,
+                    _ = watch.changed() => {
+                        let undone = watch.look().stop.map_or(0, |stop| stop.undone);
+                        assert_eq!(undone, 0, "{family}, away for {away} ms");
+                    }
+                }
+            }
+        });
+        let outcome = outcome.await.unwrap_or_else(|_| panic!("{family}: never told"));
+        let modes = outcome.stop().unwrap_or_else(|| panic!("{family}: {outcome}"));
+        assert_eq!(modes.used, Some(StopMode::Ramp), "{family}, away for {away} ms: {outcome}");
+        let writes = Plant::writes(&machine) - before;
+        assert!(writes <= 1, "{family}, away for {away} ms: written {writes} times");
     }
 }

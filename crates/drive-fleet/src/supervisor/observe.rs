@@ -98,6 +98,9 @@ impl Supervisor {
         } else if may_be_another {
             self.checks.connected(now);
         }
+        if found || self.doubtful {
+            self.doubt_stop();
+        }
         self.doubtful = false;
         self.compare(before.as_ref().map(|before| &*before.value), &status.value, found);
         if status.value.is_fault() && before.as_ref().is_some_and(|before| before.value.is_fault()) {
