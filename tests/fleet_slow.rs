@@ -197,8 +197,7 @@ async fn a_setpoint_and_a_reset_of_a_slow_drive_are_written_in_their_second_or_n
             });
             let (drive, machine) = (plant.motor(), plant.machine());
             let turnaround = family.capabilities().turnaround;
-            let patient =
-                SlaveSettings { response_timeout: Some(2_000 * MS), turnaround, ..SlaveSettings::default() };
+            let patient = SlaveSettings { response_timeout: Some(2_000 * MS), turnaround };
             plant.lines[0].configure_slave(ADDRESS, patient);
             drive.ready(BOUND).await.unwrap_or_else(|refused| panic!("{family}: {refused}"));
             if resets {

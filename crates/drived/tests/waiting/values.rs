@@ -15,7 +15,7 @@ use std::{
 use crate::home::HomeAssistant;
 use crate::page::Page;
 use crate::rig::Mosquitto;
-use crate::support::{Running, Sim, free_port, get, is_there, path, run};
+use crate::support::{Running, Sim, free_port, get, is_there, look_again, path, run};
 use serde_json::Value;
 
 /// How long something may take to come true: a guard against waiting for ever.
@@ -245,7 +245,7 @@ impl Plant {
                 Ok(stream) => break stream,
                 Err(error) => assert!(Instant::now() < end, "{error}"),
             }
-            std::thread::sleep(Duration::from_millis(20));
+            look_again();
         };
         stream.set_read_timeout(Some(PATIENCE)).expect("it does not wait for ever");
         let [high, low] = address.to_be_bytes();
