@@ -77,7 +77,9 @@ async fn a_staggered_group_starts_one_after_the_other() {
     for (drive, number) in plant.fleet.drives().iter().zip(0..) {
         plant.machine_of(drive.name()).wait_until(|machine| machine.running).await;
         assert!(begin.elapsed() >= 5 * SECOND * number, "{}", drive.name());
-        assert!(begin.elapsed() <= 5 * SECOND * number + SECOND, "{}: {:?}", drive.name(), begin.elapsed());
+        let late = begin.elapsed().saturating_sub(5 * SECOND * number);
+        // An Altivar 312 reads anew all that decides a setpoint and a start.
+        assert!(late <= SECOND + SECOND / 4, "{}: {late:?}", drive.name());
     }
     started.await.expect("it ends").expect("all start");
 }
