@@ -141,7 +141,7 @@ const FOUND_BY_STORIES: &[(&str, &str)] = &[
     ("line: another-slaves-answer", "7.3.0.f35x1.o5.o6"),
     ("line: crc-unchecked", "7.3.0.o6.l1.o11.f28x3.o7.l6"),
     ("line: transaction-unchecked", "7.4.0.o11.o5.o3.o11.f12x2.l5.o9.f71x2.o11.l6.f63x2.o11.o8"),
-    ("line: early-answer-believed", "3.0.0.f34x2.o7.o8.e18.o13.f60x1.o2.o8.e8.e15.o6.l1.l2.o0"),
+    ("line: early-answer-believed", "1.0.0.f34x0.o10"),
     ("line: late-answer-unfeared", "7.0.0.o10.l6.f69x1.o11.f10x0.o5.o7.o3.l3.o6.o0.o8"),
     ("line: edge-repeated", "2.1.0.l4.l2.f31x0.e10.o1.f25x1.l7.o15.o12.o8.f42x4.f34x0.o11.f33x4"),
     ("line: command-sent-late", "1.4.0.o5.f16x0.o9.o7.e15.f70x5.e12.o6.l8.o11.f62x2.o5.e5.o5.l8"),
