@@ -657,8 +657,8 @@ mod tests {
             // By the name that the stopped machine has now, or by that which it had.
             let begun = test.plant.begin(&caller, request(held_up, start, before));
             assert_eq!(begun.err(), Some(Rejected::Stopped(held_up.to_owned())), "{held_up}");
-            let later =
-                test.plant.command(&caller, request(held_up, start, Instant::now()), LIFETIME.time()).await;
+            let (later, wait) = (request(held_up, start, Instant::now()), Duration::from_secs(3));
+            let later = test.plant.command(&caller, later, wait).await;
             assert_eq!(later.unwrap().outcome, OutcomeWord::Confirmed, "what is asked behind it is done");
         }
     }
