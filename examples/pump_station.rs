@@ -2,7 +2,7 @@
 //! their limit and leaves when they no longer do, and a pump that trips is replaced by the one that rests.
 //!
 //! ```console
-//! $ cargo run -p examples --example pump_station                 # simulated: a day in half a minute, and a trip
+//! $ cargo run -p examples --example pump_station                 # simulated: a day in forty seconds, and a trip
 //! $ cargo run -p examples --example pump_station /dev/ttyUSB0    # Altivar 312 at 1 to 3, 19200 8E1
 //! ```
 
@@ -23,7 +23,7 @@ const PUMPS: [&str; 3] = ["pump 1", "pump 2", "pump 3"];
 const DEMAND: [u16; 10] = [56, 62, 76, 96, 108, 102, 84, 72, 60, 54];
 /// Two pumps run up to this; above it the third joins.
 const TWO_CARRY: u16 = 90;
-const HOUR: Duration = Duration::from_secs(3);
+const HOUR: Duration = Duration::from_secs(4);
 
 #[tokio::main]
 async fn main() -> Result<(), Box<dyn Error>> {
