@@ -24,10 +24,12 @@ use drive_core::{
 
 use super::*;
 use crate::{
-    event::ExitAction,
+    cause::Act,
+    event::{ExitAction, Happened},
     limits::{Band, FrequencyLimits},
     outcome::{Order, Refused, Unconfirmed, Until},
     settings::{Commanders, OnControlTaken, OnExit, OnFault, OnLoss},
+    snapshot::Snapshot,
     stop_order::StopOrder,
     testing::CAPABILITIES,
     watchdog::WatchdogContract,
