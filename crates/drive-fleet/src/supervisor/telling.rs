@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use drive_core::{Command, Setpoint};
 use tokio::time::Instant;
 
-use super::{CallId, Supervisor, Told, stopping::Stopping, withdraw::Withdrawal};
+use super::{Asker, CallId, Supervisor, Told, stopping::Stopping, withdraw::Withdrawal};
 use crate::{
     cause::Cause,
     concern,
@@ -89,5 +90,22 @@ impl Supervisor {
     pub(super) fn emit_shown(&mut self, kind: EventKind, cause: Cause) {
         self.changed = true;
         self.outputs.push_back(Output::Event(Happened { kind, cause, words: Arc::clone(&self.words) }));
+    }
+
+    /// Tells everybody how a command ended, and its caller first.
+    pub(super) fn conclude(
+        &mut self,
+        asker: Asker,
+        command: Command,
+        setpoint: Option<Setpoint>,
+        outcome: Outcome,
+    ) {
+        let (commander, cause) = (asker.name(), asker.cause());
+        match asker {
+            Asker::Caller { id, .. } => self.outputs.push_back(Output::Answer(id, outcome.clone())),
+            Asker::Policy(_) if asker.is_exit() => self.exit_concluded(&outcome),
+            Asker::Policy(_) => {}
+        }
+        self.emit_by(EventKind::Command { command, setpoint, commander, outcome }, cause);
     }
 }
