@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::{
     problem::Problem,
-    routes::{Answer, Parameter, Route},
+    route::{Answer, Parameter, Route},
 };
 
 /// Where it is served.

@@ -13,6 +13,7 @@ mod past;
 mod problem;
 mod read;
 mod reload;
+mod route;
 mod routes;
 mod selected;
 pub mod setup;
@@ -38,7 +39,8 @@ pub use self::{
 use self::{
     demo::Stage,
     problem::Problem,
-    routes::{Route, demo_routes, door_routes, reload_routes, routes, setup_routes},
+    route::Route,
+    routes::{demo_routes, door_routes, reload_routes, routes, setup_routes},
 };
 use drived_plant::plant::Plant;
 
