@@ -2,8 +2,9 @@
 
 use std::{fs, time::Duration};
 
+use drive_bus::Line;
 use drive_families::{Family, simulated};
-use drive_fleet::{DriveSettings, Fleet};
+use drive_fleet::{DriveSettings, Fleet, Left};
 use http_body_util::BodyExt as _;
 use tower::ServiceExt as _;
 
