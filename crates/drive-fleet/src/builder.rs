@@ -1,128 +1,37 @@
 //! [`FleetBuilder`]: lines and drives become a fleet, after everything that can be checked beforehand is.
 
+mod check;
+mod error;
+mod spawn;
+
 use std::{
     collections::{BTreeMap, BTreeSet},
-    sync::{Arc, RwLock},
-    time::Duration,
+    sync::Arc,
 };
 
 use drive_bus::{Line, Slave};
-use drive_core::{
-    Capabilities, Drive, INJECTION_AT_MOST, LineMismatch, Port, SlaveAddress, SlaveAddressError, StopMode,
-    WatchdogCapability,
-};
-use tokio::{
-    sync::{broadcast, mpsc, watch},
-    time::Instant,
-};
+use drive_core::{Drive, Port, SlaveAddress};
+use tokio::sync::{broadcast, mpsc};
 
+use self::spawn::spawn;
 use crate::{
     event::Teller,
     fleet::Fleet,
     handle::Entry,
     line_entry::LineEntry,
     members::Members,
-    place::Place,
-    plan::{Demand, Forecast, LineBudget, PlanProblem, forecast},
-    runs::{Keeper, RunKept},
+    plan::{Demand, Forecast, LineBudget, forecast},
+    runs::RunKept,
     settings::DriveSettings,
-    supervisor::Supervisor,
-    task::{Desk, Task},
-    watchdog::WatchdogContract,
 };
 
-/// How many orders of one drive may be on their way to its task.
-const MAILBOX: usize = 32;
-/// The longest that any period or time of a drive may be. Longer ones are mistakes, and a clock cannot hold the longest.
-const LONGEST: Duration = Duration::from_secs(365 * 86_400);
+pub use self::{
+    check::check_settings,
+    error::{FleetError, SettingProblem},
+};
+
 /// How many events are kept for a slow reader.
 const EVENTS: usize = 4_096;
-
-/// Why a fleet cannot be.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FleetError {
-    /// Two drives or two lines have one name.
-    #[error("{0:?}: the name is taken")]
-    NameTaken(String),
-    /// The fleet has no drive of this name.
-    #[error("there is no drive {0:?}")]
-    NoSuchDrive(String),
-    /// The fleet has shut down.
-    #[error("the fleet has shut down")]
-    ShutDown,
-    /// A drive names a line that is not there.
-    #[error("{drive}: there is no line {line:?}")]
-    NoSuchLine {
-        /// The drive.
-        drive: String,
-        /// The line that it names.
-        line: String,
-    },
-    /// A drive's address is none.
-    #[error("{drive}: {problem}")]
-    NoAddress {
-        /// The drive.
-        drive: String,
-        /// Why.
-        problem: SlaveAddressError,
-    },
-    /// What was made for an address talks to another one.
-    #[error("{drive}: registered at address {slave}, and made for address {made_for}")]
-    OtherAddress {
-        /// The drive.
-        drive: String,
-        /// Where it is registered.
-        slave: SlaveAddress,
-        /// Where it talks to.
-        made_for: SlaveAddress,
-    },
-    /// Two drives of one line have one address.
-    #[error("{drive}: address {slave} of line {line:?} is taken")]
-    AddressTaken {
-        /// The second drive.
-        drive: String,
-        /// The line.
-        line: String,
-        /// The address.
-        slave: SlaveAddress,
-    },
-    /// The drive cannot live on its line.
-    #[error("{drive}: {problem}")]
-    Mismatch {
-        /// The drive.
-        drive: String,
-        /// Why.
-        problem: LineMismatch,
-    },
-    /// A setting of the drive contradicts another one or its family.
-    #[error("{drive}: {problem}")]
-    Setting {
-        /// The drive.
-        drive: String,
-        /// Which and why.
-        problem: SettingProblem,
-    },
-    /// The drives of a line want more than it gives.
-    #[error("line {line:?}: {problem}")]
-    Plan {
-        /// The line.
-        line: String,
-        /// The arithmetic.
-        problem: PlanProblem,
-    },
-}
-
-/// A setting that contradicts another one or the family.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{reason}")]
-#[non_exhaustive]
-pub struct SettingProblem {
-    /// The field of [`DriveSettings`].
-    pub setting: &'static str,
-    /// One sentence: why, and what was expected.
-    pub reason: String,
-}
 
 /// What a line is before the fleet starts.
 struct Wire {
@@ -399,172 +308,5 @@ impl Member {
     /// Has the line keep the pause that the drive needs after its answers, also one that has not said so to its port.
     fn keep_pause(&self, line: &Line) {
         line.slave(self.drive.slave().number()).wants_pause(self.drive.capabilities().turnaround);
-    }
-}
-
-/// Checks what the settings of a drive say against each other, its family and its own watchdog
-/// ([`Drive::watchdog_capability`]).
-///
-/// # Errors
-/// [`SettingProblem`] with the first that does not fit.
-pub fn check_settings(
-    settings: &DriveSettings,
-    capabilities: &Capabilities,
-    watchdog: Option<WatchdogCapability>,
-) -> Result<(), SettingProblem> {
-    let problem = |setting, reason| Err(SettingProblem { setting, reason });
-    if settings.name.trim().is_empty() {
-        return problem("name", "a drive needs a name".to_owned());
-    }
-    if settings.name.chars().any(char::is_control) {
-        return problem("name", "a name has no control characters".to_owned());
-    }
-    let periods = settings.periods;
-    for (name, period) in [("running", periods.running), ("rest", periods.rest)] {
-        if period.is_zero() {
-            return problem("periods", format!("{name} is zero: expected the time between two statuses"));
-        }
-        if period >= periods.max_age {
-            return problem(
-                "periods",
-                format!(
-                    "with a status every {period:?} ({name}) and a max_age of {:?} no value is ever fresh: expected a \
-                     longer max_age",
-                    periods.max_age
-                ),
-            );
-        }
-    }
-    for (setting, times) in [("periods", periods.named()), ("times", settings.times.named())] {
-        if let Some((name, time)) = times.into_iter().find(|(_, time)| *time > LONGEST) {
-            return problem(setting, format!("{name} is {time:?}: expected a year at the most"));
-        }
-    }
-    if settings.times.lifetime.is_zero() {
-        return problem("times", "lifetime is zero: no command would ever be sent".to_owned());
-    }
-    if let Some(time) = settings.injection.filter(|time| time.is_zero() || *time > INJECTION_AT_MOST) {
-        let reason = format!("expected more than nothing and {INJECTION_AT_MOST:?} at the most");
-        return problem("injection", format!("an injection of {time:?}: {reason}"));
-    }
-    if let Err(reason) = settings.limits.check() {
-        return problem("limits", reason);
-    }
-    match settings.watchdog.map(|contract| check_watchdog(contract, capabilities.name, watchdog)) {
-        Some(Err(reason)) => problem("watchdog", reason),
-        _ => Ok(()),
-    }
-}
-
-fn check_watchdog(
-    contract: WatchdogContract,
-    name: &str,
-    watchdog: Option<WatchdogCapability>,
-) -> Result<(), String> {
-    let Some(watchdog) = watchdog else {
-        return Err(format!("the bus cannot set a communication watchdog of {name}"));
-    };
-    let timeout = contract.timeout;
-    let in_steps = timeout
-        .checked_sub(watchdog.min)
-        .is_some_and(|above| above.as_nanos().checked_rem(watchdog.step.as_nanos()).unwrap_or_default() == 0);
-    if timeout > watchdog.max || !in_steps {
-        return Err(format!(
-            "a watchdog of {timeout:?}: {name} has {:?} to {:?} in steps of {:?}",
-            watchdog.min, watchdog.max, watchdog.step
-        ));
-    }
-    if watchdog.settable && !watchdog.reactions.contains(&contract.reaction) {
-        let has: Vec<_> = watchdog.reactions.iter().map(ToString::to_string).collect();
-        return Err(format!(
-            "the watchdog of {name} has no {}: it has {}",
-            contract.reaction,
-            has.join(", ")
-        ));
-    }
-    Ok(())
-}
-
-fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Arc<Entry> {
-    let Member { settings, drive, .. } = member;
-    let (slave, capabilities) = (drive.slave(), drive.capabilities());
-    let broadcasts = StopMode::ALL
-        .into_iter()
-        .filter_map(|mode| drive.broadcast_stop(mode).map(|write| (mode, write)))
-        .collect();
-    let now = Instant::now();
-    let (watchdog, communication_fault) = (drive.watchdog_capability(), capabilities.communication_fault);
-    let supervisor = Supervisor::new(now, settings.clone(), watchdog, communication_fault);
-    let name = supervisor.name();
-    let (messages, message_box) = mpsc::channel(MAILBOX);
-    // Unbounded, because a stop must never be refused for want of room: each entry is a caller that waits.
-    let (urgent, urgent_box) = mpsc::unbounded_channel();
-    let (snapshots, snapshot) = watch::channel(Arc::new(supervisor.snapshot(now)));
-    let (exit, exited) = watch::channel(None);
-    let place = Place::of(&line.name, &line.line.config().endpoint, capabilities.key, slave);
-    let keeper =
-        Keeper::new(Arc::clone(&name), place.clone(), events.runs.clone(), settings.run_before.clone());
-    let answers = line.line.slave(slave.number());
-    let settings = Arc::new(settings);
-    let desk = Desk {
-        supervisor,
-        place: place.clone(),
-        events: events.clone(),
-        snapshots,
-        exit,
-        callers: BTreeMap::new(),
-        askers: BTreeMap::new(),
-        settings: Some(Arc::clone(&settings)),
-        round: None,
-    };
-    let turns = Arc::clone(&line.turns);
-    tokio::spawn(
-        Task { drive, desk, messages: message_box, urgent: urgent_box, turns, keeper, answers }.run(),
-    );
-    Arc::new(Entry {
-        name,
-        place,
-        line,
-        slave,
-        capabilities,
-        watchdog,
-        settings: Arc::new(RwLock::new(settings)),
-        broadcasts,
-        messages,
-        urgent,
-        calls: Arc::default(),
-        snapshots: snapshot.into(),
-        exit: exited,
-        removed: Arc::default(),
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        settings::{Periods, Times},
-        testing::CAPABILITIES,
-    };
-
-    #[test]
-    fn times_that_no_clock_can_hold_and_a_lifetime_of_nothing_are_refused() {
-        let usual = DriveSettings::controlled("pump");
-        assert_eq!(check_settings(&usual, &CAPABILITIES, CAPABILITIES.watchdog), Ok(()));
-        let (periods, times, for_ever) = (Periods::default(), Times::default(), Duration::MAX);
-        for (setting, periods, times) in [
-            ("periods", Periods { max_age: for_ever, ..periods }, times),
-            ("periods", Periods { slow: for_ever, ..periods }, times),
-            ("times", periods, Times { lifetime: for_ever, ..times }),
-            ("times", periods, Times { effect: for_ever, ..times }),
-            ("times", periods, Times { reference: for_ever, ..times }),
-            ("times", periods, Times { standstill: for_ever, ..times }),
-            ("times", periods, Times { stop_alarm: for_ever, ..times }),
-            ("times", periods, Times { lifetime: Duration::ZERO, ..times }),
-        ] {
-            let settings = DriveSettings { periods, times, ..usual.clone() };
-            let problem = check_settings(&settings, &CAPABILITIES, CAPABILITIES.watchdog).unwrap_err();
-            assert_eq!(problem.setting, setting, "{problem}");
-        }
     }
 }

@@ -4,7 +4,7 @@ use bitflags::bitflags;
 use drive_core::{Control, Direction};
 
 bitflags! {
-    /// `ETA` and `ETAD`, p. 13, 17 and 21. The states are in [`ChartState`]. Bits 8, 12 and 13 are reserved, bit 4 is
+    /// `ETA` and `ETAD`, p. 13, 17 and 21. The states are in [`ChartState`](crate::ChartState). Bits 8, 12 and 13 are reserved, bit 4 is
     /// always 0.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
     pub struct StatusWord: u16 {
