@@ -3,9 +3,7 @@
 use drive_core::{
     Class, Command, Confirming, Control, Error, Frequency, Port, Result, Setpoint, SetpointProblem, Speed,
 };
-use drive_drivecom::{
-    self as drivecom, ChartState, Drivecom, Limits, follows_frequency, follows_speed, is_speed,
-};
+use drive_drivecom::{self as drivecom, ChartState, Drivecom, Limits, follows_frequency, follows_speed};
 
 use crate::{
     Atv28,
@@ -110,13 +108,9 @@ impl<P: Port> Atv28<P> {
 
     /// Whether `FrH` may only be late, where it is not the speed of the bus that the drive follows.
     pub(crate) async fn frh_lags(&mut self, words: &FastWords, lfrd: u16) -> Result<bool> {
-        let limits = self.frequency_limits().await?;
-        let is_told = match (limits, self.speed_limits().await) {
-            (Some((_, hsp)), Ok((_, smal))) => is_speed(words.reference(), lfrd, (hsp, smal)),
-            (None, Ok(_)) | (_, Err(Error::Exception { .. })) => false,
-            (_, Err(error)) => return Err(error),
-        };
-        Ok(!is_told && self.proof.frh_may_lag())
+        let hsp = self.frequency_limits().await?.map(|(_, hsp)| hsp);
+        let speeds = self.speed_limits().await;
+        self.proof.frh_lags(words.reference(), lfrd, hsp, speeds)
     }
 
     async fn follows_speed(&mut self) -> Result<(u16, bool)> {

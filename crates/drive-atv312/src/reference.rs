@@ -1,7 +1,7 @@
 //! Which reference the drive follows: that of the bus, or another one, and which.
 
-use drive_core::{Class, Error, Port, Refusal, Result};
-use drive_drivecom::{follows_frequency, follows_speed, is_speed};
+use drive_core::{Class, Port, Refusal, Result};
+use drive_drivecom::{follows_frequency, follows_speed};
 
 use crate::{
     Atv312,
@@ -29,12 +29,8 @@ impl<P: Port> Atv312<P> {
     /// Whether `FrH` may only be late, where it is not the speed of the bus that the drive follows.
     pub(crate) async fn frh_lags(&mut self, words: &FastWords, lfrd: u16) -> Result<bool> {
         let (_, hsp) = self.frequency_limits().await?;
-        let is_told = match self.speed_limits().await {
-            Ok((_, smal)) => is_speed(words.reference(), lfrd, (hsp, smal)),
-            Err(Error::Exception { .. }) => false,
-            Err(error) => return Err(error),
-        };
-        Ok(!is_told && self.proof.frh_may_lag())
+        let speeds = self.speed_limits().await;
+        self.proof.frh_lags(words.reference(), lfrd, Some(hsp), speeds)
     }
 
     /// What decides the reference instead of the bus, or would after a start by the bus, as far as settings, inputs and the

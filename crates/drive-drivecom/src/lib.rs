@@ -17,6 +17,6 @@ pub use chart::{
     ChartState, DISABLE_VOLTAGE, ENABLE_OPERATION, FAULT_RESET, QUICK_STOP, SHUTDOWN, SWITCH_ON,
 };
 pub use ladder::{Drivecom, StopWord, may_start, reset_fault, start, stop, withdraw};
-pub use limits::{follows_frequency, follows_speed, is_speed, speed_limits, speed_word};
+pub use limits::{follows_frequency, follows_speed, speed_limits, speed_word};
 pub use proof::{Followed, Limits, Proof, Question};
 pub use words::{ControlWord, ExtendedStatus, RunShown, StatusWord, StatusWords};

@@ -28,7 +28,7 @@ pub const fn follows_speed(frhd: u16, lfrd: u16) -> bool {
 /// Whether the reference before the ramp, `FrH`, is this speed, by the high limit that the drive tells in both units: `HSP`, and `SMAL` in
 /// rpm. Of a drive that tells none it is not known to be.
 #[must_use]
-pub fn is_speed(frh: Frequency, speed: u16, (hsp, smal): (Frequency, Speed)) -> bool {
+pub(crate) fn is_speed(frh: Frequency, speed: u16, (hsp, smal): (Frequency, Speed)) -> bool {
     let [frh, hsp] = [frh, hsp].map(|frequency| u64::from(frequency.centihertz()));
     let [speed, smal] = [u64::from(speed.cast_signed().unsigned_abs()), u64::from(smal.rpm())];
     // One is what the reference of the bus and its image at the ramp differ by, another what both units do.

@@ -7,9 +7,11 @@ use tokio::time::Instant;
 
 use super::{
     chart::ChartState,
-    limits::{follows_frequency, follows_speed},
+    limits::{follows_frequency, follows_speed, is_speed},
 };
-use drive_core::{Direction, ErrorKind, Frequency, Ground, Lease, Motion, Output, Result, RunWord, Watch};
+use drive_core::{
+    Direction, Error, ErrorKind, Frequency, Ground, Lease, Motion, Output, Result, RunWord, Speed, Watch,
+};
 
 /// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the keypad may
 /// change them.
@@ -125,10 +127,25 @@ impl<L: Copy + PartialEq> Proof<L> {
         (self.held, self.lags_since) = (None, None);
     }
 
-    /// `FrH` is another reference than the one that the drive follows, as its speed shows. Whether it may only be late: what it shows then is
-    /// that of before, and a run command in force at that was not confirmed.
-    pub fn frh_may_lag(&mut self) -> bool {
-        self.lags_since.get_or_insert_with(Instant::now).elapsed() < SHOWN_WITHIN
+    /// The drive follows this speed of the bus. Whether `FrH` is another reference, by the high limit that it tells in hertz and among its
+    /// `speeds`, and may only be late: what it shows then is that of before, and a run command in force at that was not confirmed.
+    ///
+    /// # Errors
+    /// That of the speeds; a drive that refuses them tells none.
+    pub fn frh_lags(
+        &mut self,
+        frh: Frequency,
+        lfrd: u16,
+        hsp: Option<Frequency>,
+        speeds: Result<(Speed, Speed)>,
+    ) -> Result<bool> {
+        let smal = match speeds {
+            Ok((_, smal)) => Some(smal),
+            Err(Error::Exception { .. }) => None,
+            Err(error) => return Err(error),
+        };
+        let is_told = hsp.zip(smal).is_some_and(|limits| is_speed(frh, lfrd, limits));
+        Ok(!is_told && self.lags_since.get_or_insert_with(Instant::now).elapsed() < SHOWN_WITHIN)
     }
 
     /// The drive has confirmed the control word.

@@ -2,13 +2,12 @@
 //! asked and stopped.
 
 use std::{
-    any::Any,
     panic::{AssertUnwindSafe, catch_unwind},
     time::Duration,
 };
 
 use drive_core::{
-    Class, Direction, Drive, Error, Follower, Ground, Lease, Lifetimes, Refusal, Setpoint, later,
+    Class, Direction, Drive, Error, Follower, Ground, Lease, Lifetimes, Refusal, Setpoint, later, panic_said,
 };
 use tokio::time::Instant;
 
@@ -17,9 +16,6 @@ use crate::{
     settings::{DriveSettings, RunRecord},
     supervisor::{Job, Lifetime, Question, Reply, Told},
 };
-
-/// How much is kept of what a panic says, in characters.
-const SAID: usize = 200;
 
 /// The driver of a drive. What it is asked at once never panics here; a call may.
 pub(crate) struct Driver {
@@ -43,7 +39,7 @@ impl Driver {
     /// What it says or takes at once, or `otherwise` where it panics.
     fn at_once<T>(&mut self, otherwise: T, asked: impl FnOnce(&mut dyn Drive) -> T) -> T {
         catch_unwind(AssertUnwindSafe(|| asked(&mut *self.drive))).unwrap_or_else(|panic| {
-            self.panicked = Some(said(&*panic));
+            self.panicked = Some(panic_said(&*panic));
             otherwise
         })
     }
@@ -109,13 +105,6 @@ impl Driver {
         let reply = call(&mut *self.drive, job, lifetime).await;
         (reply, self.lease())
     }
-}
-
-/// What a panic says of itself.
-pub(crate) fn said(panic: &(dyn Any + Send)) -> String {
-    let text =
-        panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    text.unwrap_or("it does not say why").chars().take(SAID).collect()
 }
 
 /// How long what a job asks may wait until it is sent. The time of an order is that order's alone: what looks at a stop is in

@@ -9,7 +9,7 @@ use std::{
 };
 
 use drive_bus::{Latest, Slave};
-use drive_core::{Drive, Followed, Lease};
+use drive_core::{Drive, Followed, Lease, panic_said};
 use futures_util::{FutureExt, future::poll_immediate};
 use tokio::{
     sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
@@ -18,7 +18,7 @@ use tokio::{
 
 use crate::{
     cause::Act,
-    driver::{Driver, said},
+    driver::Driver,
     event::{ExitAction, Moment, Teller},
     message::{Message, Urgent},
     outcome::Refused,
@@ -71,7 +71,7 @@ impl Task {
             followed,
         };
         while let Err(panic) = AssertUnwindSafe(talk.go_on()).catch_unwind().await {
-            let in_a_call = talk.desk.supervisor.handle_panicked(Instant::now(), said(&*panic));
+            let in_a_call = talk.desk.supervisor.handle_panicked(Instant::now(), panic_said(&*panic));
             if !in_a_call {
                 sleep(AFTER_PANIC).await;
             }

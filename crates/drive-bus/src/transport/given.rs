@@ -11,6 +11,7 @@ use std::{
     time::Duration,
 };
 
+use drive_core::panic_said;
 use tokio::{
     io::{AsyncRead, AsyncWrite, ReadBuf},
     time::timeout,
@@ -76,6 +77,5 @@ fn guarded<T>(poll: impl FnOnce() -> Poll<io::Result<T>>) -> Poll<io::Result<T>>
 }
 
 fn told(panic: &(dyn Any + Send)) -> io::Error {
-    let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
-    io::Error::other(format!("the stream has panicked: {}", text.unwrap_or("it has not said why")))
+    io::Error::other(format!("the stream has panicked: {}", panic_said(panic)))
 }
