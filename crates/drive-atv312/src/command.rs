@@ -22,8 +22,8 @@ use crate::{
 
 impl<P: Port> Atv312<P> {
     pub(crate) async fn stop_motor(&mut self, mode: StopMode) -> Result<Stopped> {
-        if mode == StopMode::DcInjection && self.injects && !self.known.settings.knows_stop() {
-            self.read_for_an_injection().await;
+        if self.brought_down == Some(mode) && !self.known.settings.knows_stop() {
+            self.read_for_a_stop_under_way(mode).await;
         }
         let stopped = drivecom::stop(self, mode).await;
         if matches!(stopped, Err(Error::NotConfirmed { because: None, .. })) {
@@ -34,16 +34,18 @@ impl<P: Port> Atv312<P> {
         stopped
     }
 
-    /// What an injection depends on, for a drive that was seen to inject and whose settings are not known: the quick stop, which is sure
-    /// without them, would end the direct current, and the motor would coast. Nothing is late meanwhile, for it is being braked; where it is
-    /// no more, or does not tell, the stop goes out without.
-    async fn read_for_an_injection(&mut self) {
+    /// What a stop depends on that is given anew, for a drive that was seen to make it and whose settings are not known: the quick stop, which is
+    /// sure without them, would end a direct current, and the motor would coast, or make a quick stop of a ramp. Nothing is late meanwhile, for
+    /// the motor is brought down; where it is no more, or does not tell, the stop goes out without.
+    async fn read_for_a_stop_under_way(&mut self, mode: StopMode) {
+        let is_run = |word| ControlWord::from_bits_retain(word).is_run();
+        if self.proof.held().is_some_and(is_run) {
+            return;
+        }
         let Ok(words) = self.fast_words(Class::Command).await else { return };
         let Ok(controls) = self.read_controls(Class::Command).await else { return };
-        // By a bit of the bus: what an input injects ends with the input, and a run command would go on.
-        if !injects_by_the_bus(words.state_words())
-            || ControlWord::from_bits_retain(controls.command).is_run()
-        {
+        // By a bit of the bus: what an input brings down ends with the input, and a run command would go on.
+        if brought_down_by_the_bus(words.state_words()) != Some(mode) || is_run(controls.command) {
             return;
         }
         while !self.known.settings.knows_stop() && !self.known.settings.is_complete() {
@@ -72,7 +74,7 @@ impl<P: Port> Atv312<P> {
             class == Class::Command && command.is_stop() || words.state_words().can_hold(command)
         });
         self.control = Some(words.state_words().control());
-        self.injects = injects_by_the_bus(words.state_words());
+        self.brought_down = brought_down_by_the_bus(words.state_words());
         self.see_shaft(&words);
         let verdict = self.evidence(&words).and_then(|evidence| self.proof.watch.run.verdict(&evidence));
         Ok(Status { verdict, ..self.status_of(&words) })
@@ -450,11 +452,17 @@ impl<P: Port> Drivecom for Atv312<P> {
     }
 }
 
-/// Whether the motor is braked by direct current while the bus commands.
-fn injects_by_the_bus(words: StatusWords) -> bool {
-    words.chart() == Some(ChartState::OperationEnabled)
-        && words.control() == Control::Bus
-        && words.eti.contains(ExtendedStatus::DC_INJECTION)
+/// By what the motor is brought down while the bus commands, where that is direct current or a ramp: the fast stop has a word that is sure.
+fn brought_down_by_the_bus(words: StatusWords) -> Option<StopMode> {
+    if words.chart() != Some(ChartState::OperationEnabled) || words.control() != Control::Bus {
+        return None;
+    }
+    let is = |bits| words.eti.contains(bits);
+    match (is(ExtendedStatus::DC_INJECTION), is(ExtendedStatus::DECELERATING)) {
+        (true, _) => Some(StopMode::DcInjection),
+        (false, true) if !is(ExtendedStatus::FAST_STOP) => Some(StopMode::Ramp),
+        _ => None,
+    }
 }
 
 /// The word that stops every drive of this family at once, for the stops that no setting changes: the others would

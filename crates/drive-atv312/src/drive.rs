@@ -36,7 +36,7 @@ impl<P: Port> Drive for Atv312<P> {
 
     fn forget(&mut self) {
         self.proof.forget();
-        (self.known, self.control, self.injects) = (Known::default(), None, false);
+        (self.known, self.control, self.brought_down) = (Known::default(), None, None);
     }
 
     /// W3201 to W3206 in one exchange. Where these words alone do not tell the frequency or whether a run command is in

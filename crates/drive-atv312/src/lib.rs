@@ -86,8 +86,8 @@ pub struct Atv312<P> {
     high_bits: u16,
     /// Who commanded when it was last read.
     control: Option<Control>,
-    /// Whether direct current braked the motor by command of the bus in the last status.
-    injects: bool,
+    /// By what the bus brought the motor down in the last status: direct current, or a ramp.
+    brought_down: Option<StopMode>,
     /// What the bus control set-up has changed, with what it was before, in the order of the changes.
     set_up_before: Vec<(Register<WriteStopped>, u16)>,
     /// Whether the automatic restart is accepted.
@@ -117,7 +117,7 @@ impl<P: Port> Atv312<P> {
             known: Known::default(),
             high_bits: 0,
             control: None,
-            injects: false,
+            brought_down: None,
             set_up_before: Vec::new(),
             accepts_restart: false,
             counted: None,

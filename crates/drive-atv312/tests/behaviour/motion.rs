@@ -115,19 +115,48 @@ async fn a_drive_that_was_adopted_running_is_stopped_in_each_mode() {
     }
 }
 
-/// The next program knows no setting of it. 0002h would end the direct current, and a motor without output coasts (BBV51701 p. 11, 40).
+/// The next program knows no setting of it. 0002h would end the direct current, and a motor without output coasts (BBV51701 p. 11, 40);
+/// it would bring it down four times as fast as its ramp (dCF, p. 40).
 #[tokio::test(start_paused = true)]
-async fn an_injection_of_before_that_is_given_anew_goes_on_at_whatever_access_level() {
-    for (mut drive, machine, line) in [rig(), factory()] {
+async fn a_stop_of_before_that_is_given_anew_goes_on_at_whatever_access_level() {
+    for (mode, word) in [(StopMode::DcInjection, 0x200F), (StopMode::Ramp, 0x100F)] {
+        for (mut drive, machine, line) in [rig(), factory()] {
+            bench::run_at_fifty(&mut drive, &machine).await;
+            drive.stop(mode).await.unwrap();
+            let mut next = Atv312::new(line.slave(1), bench::address(1));
+            assert_eq!(next.status().await.unwrap().motion, Motion::Braking);
+            let before = commands(&machine).len();
+            let stopped = next.stop(mode).await.unwrap();
+            assert_eq!((stopped.mode, stopped.instead), (mode, None));
+            assert_eq!(commands(&machine)[before..], [word]);
+            assert_eq!(next.status().await.unwrap().motion, Motion::Braking);
+        }
+    }
+}
+
+/// Each comes down: to a lower setpoint by a run command, and by a fast stop, which no ramp takes the place of.
+#[tokio::test(start_paused = true)]
+async fn a_stop_by_ramp_of_a_motor_that_is_not_stopped_by_one_already_waits_for_no_settings() {
+    for stops_fast in [false, true] {
+        let (mut drive, machine, line) = rig();
         bench::run_at_fifty(&mut drive, &machine).await;
-        drive.stop(StopMode::DcInjection).await.unwrap();
+        if stops_fast {
+            assert!(machine.poke(row("FSt").address, 174), "Cd14");
+            drive.forget();
+            drive.may_start(Direction::Forward, None).await.unwrap();
+            drive.stop(StopMode::Fast).await.unwrap();
+            assert_eq!(commands(&machine).last(), Some(&0x400F));
+        } else {
+            drive.set_setpoint(Setpoint::Frequency(Frequency::from_hertz(10))).await.unwrap();
+        }
+        machine.wait_until(|seen| seen.output_frequency < 4_900).await;
         let mut next = Atv312::new(line.slave(1), bench::address(1));
-        assert_eq!(next.status().await.unwrap().motion, Motion::Braking);
-        let before = commands(&machine).len();
-        let stopped = next.stop(StopMode::DcInjection).await.unwrap();
-        assert_eq!((stopped.mode, stopped.instead), (StopMode::DcInjection, None));
-        assert_eq!(commands(&machine)[before..], [0x200F]);
-        assert_eq!(next.status().await.unwrap().motion, Motion::Braking);
+        next.status().await.unwrap();
+        let before = machine.received().len();
+        assert_eq!(next.stop(StopMode::Ramp).await.unwrap().mode, StopMode::Fast);
+        let first = &machine.received()[before].pdu;
+        // The bits above the chart's stay as the drive holds them.
+        assert_eq!((&first[..3], first[4]), (&[0x06, 0x21, 0x35][..], 0x02), "CMD, the quick stop");
     }
 }
 
@@ -143,8 +172,7 @@ async fn a_stop_of_a_motor_that_an_input_injects_into_waits_for_no_settings() {
     let _ = next.stop(StopMode::DcInjection).await;
     let behind: Vec<_> =
         machine.received().split_off(before).into_iter().map(|request| request.pdu[0]).collect();
-    // The words and CMD, and the stop.
-    assert_eq!(behind[..3], [0x03, 0x03, 0x06], "{behind:x?}");
+    assert_eq!(behind[0], 0x06, "{behind:x?}");
 }
 
 #[tokio::test(start_paused = true)]
