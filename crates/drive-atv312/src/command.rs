@@ -244,15 +244,7 @@ impl<P: Port> Drivecom for Atv312<P> {
     /// The bits that have another function in this drive stay as it holds them, and the channels with the bus.
     async fn write_control(&mut self, class: Class, word: u16, effect: Effect) -> Result<()> {
         let word = self.as_written(word);
-        self.proof.is_writing(word);
-        let mut calls = self.registers.at(class);
-        match (class, effect) {
-            // What a stop has done is read as a command.
-            (Class::Stop, _) => calls.write_word(CMD.address(), word).await?,
-            (_, Effect::Edge) => calls.edge().write(CMD, word).await?,
-            (_, Effect::Level) => calls.write(CMD, word).await?,
-        }
-        self.proof.was_written(word);
+        self.proof.write_control(&mut self.registers, CMD, (class, word, effect)).await?;
         self.hold(word);
         Ok(())
     }

@@ -110,16 +110,7 @@ impl<P: Port> Drivecom for Atv58<P> {
         {
             self.turned = self.turning;
         }
-        self.proof.is_writing(word);
-        let mut calls = self.registers.at(class);
-        match (class, effect) {
-            // What a stop has done is read as a command.
-            (Class::Stop, _) => calls.write_word(CMD.address(), word).await?,
-            (_, Effect::Edge) => calls.edge().write(CMD, word).await?,
-            (_, Effect::Level) => calls.write(CMD, word).await?,
-        }
-        self.proof.was_written(word);
-        Ok(())
+        self.proof.write_control(&mut self.registers, CMD, (class, word, effect)).await
     }
 
     async fn refuses_start(

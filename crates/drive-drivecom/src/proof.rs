@@ -10,7 +10,9 @@ use super::{
     limits::{follows_frequency, follows_speed, is_speed},
 };
 use drive_core::{
-    Direction, Error, ErrorKind, Frequency, Ground, Lease, Motion, Output, Result, RunWord, Speed, Watch,
+    Class, Direction, Effect, Error, ErrorKind, Frequency, Ground, Lease, Motion, Output, Port, Registers,
+    Result, RunWord, Speed, Watch,
+    registers::{Register, access::Writable},
 };
 
 /// How long the limits of a setpoint are taken for those of the drive without being read again: somebody at the keypad may
@@ -121,6 +123,29 @@ impl<L: Copy + PartialEq> Proof<L> {
         (self.held, self.reference) = (Some(word), Some(reference));
     }
 
+    /// Writes the control word to its register in this class, and remembers it as the one that the drive holds; while the outcome is not known,
+    /// none is.
+    ///
+    /// # Errors
+    /// Those of [`Registers`].
+    pub async fn write_control<P: Port>(
+        &mut self,
+        registers: &mut Registers<P>,
+        cmd: Register<impl Writable>,
+        (class, word, effect): (Class, u16, Effect),
+    ) -> Result<()> {
+        self.is_writing(word);
+        let mut calls = registers.at(class);
+        match (class, effect) {
+            // What a stop has done is read as a command.
+            (Class::Stop, _) => calls.write_word(cmd.address(), word).await?,
+            (_, Effect::Edge) => calls.edge().write(cmd, word).await?,
+            (_, Effect::Level) => calls.write(cmd, word).await?,
+        }
+        self.held = Some(word);
+        Ok(())
+    }
+
     /// A control word is about to be written: what the drive holds is not known until it has confirmed it.
     pub const fn is_writing(&mut self, word: u16) {
         self.watch.run.sends(word);
@@ -146,11 +171,6 @@ impl<L: Copy + PartialEq> Proof<L> {
         };
         let is_told = hsp.zip(smal).is_some_and(|limits| is_speed(frh, lfrd, limits));
         Ok(!is_told && self.lags_since.get_or_insert_with(Instant::now).elapsed() < SHOWN_WITHIN)
-    }
-
-    /// The drive has confirmed the control word.
-    pub const fn was_written(&mut self, word: u16) {
-        self.held = Some(word);
     }
 
     /// What the drive holds is not known any more, unless `it_can` still hold it.
@@ -392,7 +412,7 @@ mod tests {
     fn a_word_that_was_only_written_tells_of_no_lease_that_has_gone() {
         let mut proof = Proof::<u8>::default();
         proof.is_writing(0x0007);
-        proof.was_written(0x0007);
+        proof.held = Some(0x0007);
         assert_eq!(proof.told_word(gone), RunWord::NotTold);
         proof.was_read(0x0007, 0);
         assert_eq!(proof.told_word(gone), RunWord::Gone);
