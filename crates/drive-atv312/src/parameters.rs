@@ -117,8 +117,9 @@ impl<P: Port> Atv312<P> {
             }
         };
         if may_have_changed {
-            // One may change others as well, as LAC (p. 35) and tCC (p. 33) do: all are read again.
-            self.known = Known::default();
+            // One may change others as well, as LAC (p. 35) and tCC (p. 33) do: all are read again. Until its turn the input that inhibits
+            // faults is looked at all the same.
+            self.known = Known { inhibits: self.known.inhibits, ..Known::default() };
             self.proof.holds_if(|_| false);
             self.proof.doubt_limits();
             self.unsaved |= matches!(row.storage, Storage::RamUntilSaved | Storage::Unknown);
@@ -226,16 +227,21 @@ impl<P: Port> Atv312<P> {
         const INHIBITED: Refusal = Refusal::Settings(
             "a closed input inhibits every fault of the drive, that of its watchdog too (InH, p. 54): open it, or set InH to nO",
         );
-        let absent = &mut self.known.absent;
-        let inhibits = absent.word(&mut self.registers.at(Class::Background), INH.address()).await?;
-        self.known.inhibits = inhibits.and_then(|source| source.checked_sub(LI1)).filter(|&input| input < 6);
-        self.proof.watch.knows(INH.address(), inhibits.unwrap_or(0));
+        let inhibits = self.learn_inhibition(Class::Background).await?;
+        self.proof.watch.knows(INH.address(), inhibits);
         let is_closed = match self.known.inhibits {
             Some(input) => self.registers.at(Class::Background).read(IOLR).await? >> input & 1 == 1,
             None => false,
         };
         self.proof.watch.knows(IOLR.address(), is_closed.into());
         if is_closed { Err(self.refused(Command::ArmWatchdog, INHIBITED)) } else { Ok(()) }
+    }
+
+    /// Reads `InH`, and which input it is.
+    pub(crate) async fn learn_inhibition(&mut self, class: Class) -> Result<u16> {
+        let inhibits = self.known.absent.word(&mut self.registers.at(class), INH.address()).await?;
+        self.known.inhibits = inhibits.and_then(|source| source.checked_sub(LI1)).filter(|&input| input < 6);
+        Ok(inhibits.unwrap_or(0))
     }
 
     /// Sets the three, reads them back and compares, where the watchdog can act.

@@ -139,7 +139,10 @@ impl<P: Port> Atv312<P> {
                     let word = self.registers.at(class).read(SLL).await?;
                     self.proof.watch.finds(SLL.address(), word, Ground::Watchdog);
                 }
-                3 => self.read_inhibition(class).await?,
+                3 => {
+                    let word = self.learn_inhibition(class).await?;
+                    self.proof.watch.finds(INH.address(), word, Ground::Watchdog);
+                }
                 4 => self.read_second_ramp(class).await?,
                 5 => self.read_ramp_time(class).await?,
                 block => self.read_setting_again(class, block - TURNS).await?,
@@ -152,16 +155,12 @@ impl<P: Port> Atv312<P> {
         Ok(())
     }
 
-    /// The input that inhibits every fault, or, where none does, whether one is assigned to that by now.
+    /// The input that inhibits every fault.
     async fn read_inhibition(&mut self, class: Class) -> Result<(), Error> {
-        let (register, word) = match self.known.inhibits {
-            Some(input) => (IOLR.address(), self.registers.at(class).read(IOLR).await? >> input & 1),
-            None => {
-                let inhibits = self.known.absent.word(&mut self.registers.at(class), INH.address()).await?;
-                (INH.address(), inhibits.unwrap_or(0))
-            }
-        };
-        self.proof.watch.finds(register, word, Ground::Watchdog);
+        if let Some(input) = self.known.inhibits {
+            let is_closed = self.registers.at(class).read(IOLR).await? >> input & 1;
+            self.proof.watch.finds(IOLR.address(), is_closed, Ground::Watchdog);
+        }
         Ok(())
     }
 

@@ -74,6 +74,8 @@ async fn a_watchdog_whose_fault_an_input_inhibits_is_neither_found_nor_set_up() 
     let armed = drive.arm_watchdog(Duration::from_secs(5), Reaction::Ramp).await.unwrap();
     assert!(machine.poke(row("InH").address, 134));
     assert_eq!(drive.watchdog().await.unwrap(), armed, "assigned, and open");
+    // Behind a parameter that was written everything is read anew.
+    drive.write_parameter(row("ACC"), 31).await.unwrap();
     drive.start(Direction::Forward).await.unwrap();
     assert!(machine.poke(row("IOLR").address, LI6));
     let mut found = None;

@@ -112,7 +112,7 @@ pub(crate) struct Known {
     /// The registers that this drive lacks.
     pub(crate) absent: Absent,
     pub(crate) speeds: Option<(Speed, Speed)>,
-    /// The input that inhibits every fault, by `InH`, as it was read with the watchdog.
+    /// The input that inhibits every fault, by `InH`, as it was read last.
     pub(crate) inhibits: Option<u16>,
     /// Whether a status was read since, so that the next one has time for a setting.
     pub(crate) seen: bool,
