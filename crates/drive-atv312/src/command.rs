@@ -25,13 +25,18 @@ impl<P: Port> Atv312<P> {
         if self.brought_down == Some(mode) && !self.known.settings.knows_stop() {
             self.read_for_a_stop_under_way(mode).await;
         }
-        let stopped = drivecom::stop(self, mode).await;
-        if matches!(stopped, Err(Error::NotConfirmed { because: None, .. })) {
-            // The settings may have been changed at the drive: the next attempt does without them, and reads them. Where the drive says who
-            // has the motor instead, they are not what it lacks.
-            self.known.settings = Known::default().settings;
+        match drivecom::stop(self, mode).await {
+            Err(Error::NotConfirmed { slave, command, status, because: None }) => {
+                let because = FastWords::in_status(&status).refuses_while_saving();
+                if because.is_none() {
+                    // The settings may have been changed at the drive: the next attempt does without them, and reads them. Where the drive
+                    // says who has the motor instead, or that it takes no word now, they are not what it lacks.
+                    self.known.settings = Known::default().settings;
+                }
+                Err(Error::NotConfirmed { slave, command, status, because })
+            }
+            stopped => stopped,
         }
-        stopped
     }
 
     /// What a stop depends on that is given anew, for a drive that was seen to make it and whose settings are not known: the quick stop, which is

@@ -148,6 +148,18 @@ async fn a_stop_to_a_motor_that_no_word_of_the_bus_reaches_is_told_at_once() {
     assert_eq!(commands(drive), [0x100F; 2], "and written all the same");
 }
 
+/// ETI bit 0: nothing can be written while it saves (BBV51701 p. 22).
+#[tokio::test(start_paused = true)]
+async fn a_stop_to_a_drive_that_saves_is_told_as_such_and_goes_on_as_the_stop_that_was_asked_for() {
+    let saves = [(3201, 0x0627), (3202, 300), (3203, 300), (3206, 0x4013), (CMD, 0x000F)];
+    let mut drive = watched(&[&FOR_THE_BUS, &saves]).await;
+    for _ in 0..2 {
+        let error = drive.stop(StopMode::Ramp).await.unwrap_err();
+        assert!(because(&error).is_some_and(|because| because.to_string().contains("EEPROM")), "{error}");
+    }
+    assert!(commands(drive).iter().all(|word| *word == 0x100F));
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_motor_under_direct_current_has_not_come_to_a_stop() {
     // p. 20: stopped is ETI.4 = ETI.5 = 0.
