@@ -50,6 +50,8 @@ pub(crate) struct Leave {
     pub(super) since: Instant,
     /// The direction of that start.
     pub(super) direction: Direction,
+    /// It brings a setpoint of its own along.
+    brings_setpoint: bool,
 }
 
 impl Supervisor {
@@ -65,7 +67,8 @@ impl Supervisor {
         match self.refuse_commander(Some(name), &order) {
             Some(refused) => Err(refused),
             None => {
-                let leave = Leave { stops: self.stops, since: now, direction };
+                let brings_setpoint = setpoint.is_some();
+                let leave = Leave { stops: self.stops, since: now, direction, brings_setpoint };
                 self.allow(now, order, None).map_err(Blocked::reason)?;
                 self.driven_by_another().map_or(Ok(leave), |refusal| Err(Refused::Because(refusal)))
             }
@@ -125,9 +128,10 @@ impl Supervisor {
         if leave.is_some_and(is_over) {
             return Some(Refused::Stopped);
         }
-        // Who has been asked for another setpoint since does not come back to this one.
-        let is_older = |leave: Leave| self.setpoint_asked_at.is_some_and(|at| leave.since < at);
-        if order.setpoint().is_some() && leave.is_some_and(is_older) {
+        // Who has been asked for another setpoint since does not come back to this one, and is not started at that one.
+        let is_older =
+            |leave: Leave| leave.brings_setpoint && self.setpoint_asked_at.is_some_and(|at| leave.since < at);
+        if leave.is_some_and(is_older) {
             return Some(Refused::Superseded);
         }
         (self.queue.len() >= QUEUE).then_some(Refused::QueueFull)

@@ -32,19 +32,31 @@ fn the_setpoint_of_a_group_that_starts_is_given_as_that_of_a_start_in_its_direct
 
 /// Whoever asked for it later does not get the older one.
 #[test]
-fn the_setpoint_of_a_group_does_not_take_the_place_of_one_that_was_asked_for_since() {
-    let mut rig = Rig::ready();
-    let leave = rig.machine.leave(rig.now, "tester", Direction::Forward, None).unwrap();
-    rig.pass(100 * MS);
-    let later = rig.order(setpoint(45));
-    rig.pass(500 * MS);
-    assert!(rig.outcome(later).is_some_and(Outcome::is_confirmed));
-    let asker = rig.asker();
-    let id = asker.id().expect("it is a caller's");
-    rig.machine.handle_order(rig.now, asker, setpoint(20), Some(leave), None);
-    rig.pass(500 * MS);
-    assert_eq!(rig.outcome(id), Some(&Outcome::Refused(Refused::Superseded)));
-    assert_eq!(rig.snapshot().setpoint, Some(Frequency::from_hertz(45).into()));
+fn the_setpoint_of_a_group_does_not_take_the_place_of_one_that_was_asked_for_since_nor_is_that_one_started_at()
+ {
+    for is_given in [false, true] {
+        let mut rig = Rig::ready();
+        let twenty = Frequency::from_hertz(20).into();
+        let leave = rig.machine.leave(rig.now, "tester", Direction::Forward, Some(twenty)).unwrap();
+        let order = |rig: &mut Rig, order| {
+            let asker = rig.asker();
+            let id = asker.id().expect("it is a caller's");
+            rig.machine.handle_order(rig.now, asker, order, Some(leave), None);
+            rig.pass(500 * MS);
+            rig.outcome(id).cloned()
+        };
+        if is_given {
+            assert!(order(&mut rig, setpoint(20)).is_some_and(|outcome| outcome.is_confirmed()));
+        }
+        rig.pass(100 * MS);
+        let later = rig.order(setpoint(45));
+        rig.pass(500 * MS);
+        assert!(rig.outcome(later).is_some_and(Outcome::is_confirmed));
+        let next = if is_given { START } else { setpoint(20) };
+        assert_eq!(order(&mut rig, next), Some(Outcome::Refused(Refused::Superseded)));
+        assert_eq!(rig.snapshot().setpoint, Some(Frequency::from_hertz(45).into()));
+        assert!(!rig.drive.log.contains(&Job::Start(Direction::Forward)));
+    }
 }
 
 /// What is shown as its setpoint is what it is started at, whoever has written the reference since; a group has just given it.
