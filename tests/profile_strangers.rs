@@ -22,7 +22,7 @@ use support::peers;
 use tokio::{
     io::{AsyncBufReadExt as _, AsyncWriteExt as _, BufReader},
     process::{Child, ChildStdin, Command},
-    sync::mpsc,
+    sync::{mpsc, watch},
     time::{Instant, sleep, timeout},
 };
 
@@ -236,6 +236,9 @@ struct Stage {
     line: Line,
     stdin: ChildStdin,
     printed: Arc<Mutex<VecDeque<(Instant, Truth)>>>,
+    /// How often it was asked to print, and how often it has.
+    asked: u64,
+    looked: watch::Receiver<u64>,
     /// What the engine came to, step by step.
     told: String,
     contradictions: Vec<String>,
@@ -260,6 +263,7 @@ impl Stage {
         let port = ready["tcp"].as_u64().expect("it names its port");
         let printed = Arc::new(Mutex::new(VecDeque::new()));
         let (to, (first, mut seen)) = (printed.clone(), mpsc::channel(1));
+        let (look, looked) = watch::channel(0);
         tokio::spawn(async move {
             while let Ok(Some(line)) = lines.next_line().await {
                 let Ok(value) = serde_json::from_str::<serde_json::Value>(&line) else { continue };
@@ -275,6 +279,7 @@ impl Stage {
                 };
                 to.lock().expect("no panic").push_back((Instant::now(), truth));
                 first.try_send(()).ok();
+                value["look"].as_u64().map(|number| look.send(number));
             }
         });
         seen.recv().await.expect("it prints its shaft");
@@ -296,6 +301,8 @@ impl Stage {
             line,
             stdin,
             printed,
+            asked: 0,
+            looked,
             told: String::new(),
             contradictions: Vec::new(),
             _child: child,
@@ -475,16 +482,19 @@ impl Stage {
     async fn look(&mut self) -> Result<Status, Error> {
         let before = Instant::now();
         let status = self.drive.status().await?;
-        let after = Instant::now();
-        // What it prints of this moment may come a little later.
         sleep(Duration::from_millis(120)).await;
-        self.judge(&status, before, after);
+        // What it prints of this moment may come late: behind what it is asked to print now nothing of before is missing.
+        self.asked += 1;
+        let asked = self.asked;
+        self.stdin.write_all(format!("look {asked}\n").as_bytes()).await.expect("it listens");
+        self.looked.wait_for(|looked| *looked >= asked).await.expect("it prints");
+        self.judge(&status, before);
         Ok(status)
     }
 
     /// What is said that was so at no time around the look.
-    fn judge(&mut self, status: &Status, before: Instant, after: Instant) {
-        let around = self.around(before.checked_sub(APART).unwrap_or(before), after + APART);
+    fn judge(&mut self, status: &Status, before: Instant) {
+        let around = self.around(before.checked_sub(APART).unwrap_or(before), Instant::now());
         let ever = |is: &dyn Fn(&Truth) -> bool| around.iter().any(is);
         let mut lies = Vec::new();
         let driven = matches!(status.motion, Motion::Driven) || status.state == State::Running;
