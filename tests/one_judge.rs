@@ -9,7 +9,6 @@ use std::{
 /// Where a state is shown and nothing is decided by it.
 const SHOWS: &[&str] = &[
     "drive-fleet/src/shows.rs",
-    "drive-fleet/src/view.rs",
     "drived-line-tools/src/poll/json.rs",
     "drived-broker/src/mqtt/discovery/drive.rs",
     "drived-gateway/src/virtual_unit.rs",

@@ -93,23 +93,21 @@ impl Settings {
 
     /// The preset speed or jog operation that is selected, by the logic inputs and the held control word.
     pub(crate) fn selected_preset(&self, inputs: u16, held: u16) -> Option<Refusal> {
-        let is_on = |source: u16| {
-            let bit = |first: u16, count: u16| source.checked_sub(first).filter(|&bit| bit < count);
-            bit(LI1, 6).is_some_and(|bit| inputs >> bit & 1 == 1)
-                || bit(CD11, 5).is_some_and(|bit| held >> (11 + bit) & 1 == 1)
+        let bit = |source: u16, first: u16, count: u16| source.checked_sub(first).filter(|&bit| bit < count);
+        let by_input = |source| bit(source, LI1, 6).is_some_and(|bit| inputs >> bit & 1 == 1);
+        let by_word = |source| bit(source, CD11, 5).is_some_and(|bit| held >> (11 + bit) & 1 == 1);
+        let (function, source) = self.presets().find(|&(_, source)| by_input(source) || by_word(source))?;
+        let (by, remedy) = match (function == address::JOG, by_input(source)) {
+            (true, true) => ("jog operation (JOG) by its input", "open the input, or set JOG to nO"),
+            (true, false) => ("jog operation (JOG) by a bit of CMD", "set JOG to nO, or to another bit"),
+            (false, true) => {
+                ("a preset speed (PS2 to PS16) by its input", "open the input, or set PS2 to PS16 to nO")
+            }
+            (false, false) => {
+                ("a preset speed (PS2 to PS16) by a bit of CMD", "set PS2 to PS16 to nO, or to other bits")
+            }
         };
-        let (function, _) = self.presets().find(|&(_, source)| is_on(source))?;
-        Some(if function == address::JOG {
-            Refusal::Overridden {
-                by: "jog operation (JOG) by its input",
-                remedy: "open the input, or set JOG to nO",
-            }
-        } else {
-            Refusal::Overridden {
-                by: "a preset speed (PS2 to PS16) by its input",
-                remedy: "open the input, or set PS2 to PS16 to nO",
-            }
-        })
+        Some(Refusal::Overridden { by, remedy })
     }
 
     fn presets(&self) -> impl Iterator<Item = (u16, u16)> {

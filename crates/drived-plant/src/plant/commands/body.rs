@@ -90,7 +90,8 @@ macro_rules! body {
             #[schemars(length(min = 1, max = LONGEST_ID))]
             id: Option<String>,
             /// After this time from its arrival nothing of it is sent any more; unless it is said, after 1000, and of a start that has begun
-            /// by then after 2000 more.
+            /// by then after 2000 more. A start of a group begins within it, and then takes as long as its lines need for its drives one after
+            /// the other: some seconds for each of a full line.
             #[schemars(range(min = 1, max = 10_000))]
             expires_in_ms: Option<u64>,
             /// When it was issued, by a clock that agrees with the daemon's: its time counts from then, and a stop since then goes before it.
