@@ -392,3 +392,51 @@ async fn a_stop_by_broadcast_reaches_only_a_line_whose_drives_are_all_meant_may_
     }
     assert!(broadcast > 0, "no family takes one");
 }
+
+/// Each start reads some thirty registers first, and has three seconds: by turns none would come to its end.
+#[tokio::test(start_paused = true)]
+async fn of_several_starts_that_are_given_at_once_on_a_line_the_first_are_carried_out_and_the_others_expire_unsent()
+ {
+    for count in [2, 3, 5, 12] {
+        let plant = standing(count).await;
+        let drives = plant.fleet.drives();
+        let starts = drives
+            .iter()
+            .map(|drive| drive.start_at(Direction::Forward, Frequency::from_hertz(20)).into_future());
+        let outcomes = futures_util::future::join_all(starts).await;
+        let confirmed = outcomes.iter().take_while(|outcome| outcome.is_confirmed()).count();
+        assert!(confirmed >= usize::from(count).min(2), "of {count}: {outcomes:?}");
+        // Whoever has not been started has not been asked for most of it either.
+        let running = drives.iter().filter(|drive| plant.machine_of(drive.name()).observe().running).count();
+        assert_eq!(running, outcomes.iter().filter(|outcome| outcome.is_confirmed()).count(), "{outcomes:?}");
+    }
+}
+
+/// A setpoint is over sooner than a start, and is sent beside it.
+#[tokio::test(start_paused = true)]
+async fn a_setpoint_that_is_given_while_others_are_started_on_its_line_is_carried_out_in_its_time() {
+    let plant = standing(4).await;
+    let [first, second, third, fourth] = ["1", "2", "3", "4"].map(|name| plant.drive(name));
+    let starts = futures_util::future::join3(
+        first.start(Direction::Forward).into_future(),
+        second.start(Direction::Forward).into_future(),
+        third.start(Direction::Forward).into_future(),
+    );
+    let later = async {
+        sleep(Duration::from_millis(50)).await;
+        fourth.set_setpoint(Frequency::from_hertz(20)).await
+    };
+    let (_, set) = futures_util::future::join(starts, later).await;
+    assert!(set.is_confirmed(), "{set}");
+}
+
+/// So many Altivar 312 on a line of 19200 bit/s, ready.
+async fn standing(count: u8) -> Plant {
+    let member = |address: u8| (Family::ATV312, address, controlled(Family::ATV312, &address.to_string()));
+    let site = Site::new(SerialSettings::MODBUS_DEFAULT, (1..=count).map(member).collect());
+    let plant = Plant::open(vec![site]).expect("it can be fed");
+    for drive in plant.fleet.drives() {
+        drive.ready(120 * SECOND).await.expect("it gets ready");
+    }
+    plant
+}

@@ -112,7 +112,8 @@ impl<P: Port> Registers<P> {
             (Class::Status | Class::Background, Some(asked_as)) => asked_as,
             _ => class,
         };
-        let terms = Terms { lifetime: self.lifetimes.of(class), begun, ..Terms::of(asked_as) };
+        let due = if matches!(asked_as, Class::Command) { self.lifetimes.due } else { None };
+        let terms = Terms { lifetime: self.lifetimes.of(class), begun, due, ..Terms::of(asked_as) };
         Calls { registers: self, terms }
     }
 

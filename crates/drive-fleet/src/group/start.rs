@@ -110,9 +110,9 @@ impl Group {
     ///
     /// On one line the starts wait for each other here and not on the line: one drive is commanded at a time, and after
     /// it the line is left to the polls for as long as they need it to keep every value fresh, by the line's plan. So a
-    /// full line takes its time: 31 drives at 19200 bit/s 10 s to 80 s. Stops wait for none of this. A drive that
-    /// is stopped meanwhile, by whomever, is not started any more even if its turn comes when that stop is long
-    /// confirmed.
+    /// full line takes its time: 31 Altivar 312 at 19200 bit/s a minute or more where a quarter of the line is left for commands, and six where
+    /// it is full. Stops wait for none of this. A drive that is stopped meanwhile, by whomever, is not started any more even if its turn comes
+    /// when that stop is long confirmed; nor is one that is started by somebody else, or asked for another setpoint than the start brings along.
     ///
     /// Each drive's outcome says which setpoint its start uses. [`GroupFailure`] names who was not ready, or did not start. Dropping the ticket before its outcome was heard takes the
     /// whole start back: see [`GroupTicket`].

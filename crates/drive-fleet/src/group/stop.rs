@@ -63,7 +63,13 @@ impl Group {
         }
         let (mut broadcasts, round) = (Vec::new(), Round::begin());
         let mut each = Vec::with_capacity(count);
-        for of_line in &lines {
+        for of_line in &mut lines {
+            // Whoever stands needs no word before those that turn have theirs.
+            let stands = |member: &DriveHandle| {
+                member.entry.snapshots.now().status.as_ref().is_some_and(|status| status.value.is_undriven())
+            };
+            of_line.members.sort_by_key(|(_, member)| stands(member));
+            let of_line = &*of_line;
             let OfLine { line, members } = of_line;
             // It is first on the line, and no start of before can come behind the stops of each.
             if let Some(write) = of_line.common_write(&standing, order.mode).filter(|_| by_broadcast) {

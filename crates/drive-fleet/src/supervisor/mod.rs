@@ -96,6 +96,10 @@ pub(crate) struct Supervisor {
     stops: u64,
     /// When the setpoint was asked for that counts, by a start or by itself.
     setpoint_asked_at: Option<Instant>,
+    /// When the last start was asked for.
+    start_asked_at: Option<Instant>,
+    /// The setpoint before the one that is sent was dropped for it.
+    setpoint_dropped: bool,
     withdrawal: Option<Withdrawal>,
     exit: Exit,
     /// Why it ends.
@@ -182,6 +186,8 @@ impl Supervisor {
             stopping: None,
             stops: 0,
             setpoint_asked_at: None,
+            start_asked_at: None,
+            setpoint_dropped: false,
             withdrawal: None,
             exit: Exit::No,
             exits_by: Policy::Exit,

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use drive_core::{Error, Setpoint, StopMode};
+use drive_core::{Class, Error, Setpoint, StopMode};
 use tokio::time::Instant;
 
 use super::{Asker, CallId, Expiry, Job, Leave, Lifetime, Supervisor, permission::Blocked};
@@ -31,6 +31,8 @@ pub(super) struct Active {
     pub(super) before: Option<Leave>,
     /// When its lifetime is over.
     expiry: Expiry,
+    /// It is a start, and the drive was asked something for it.
+    has_begun: bool,
     /// The setpoint of a start, once it has been given.
     pub(super) setpoint_given: Option<Setpoint>,
     /// The watchdog was written on its behalf.
@@ -64,7 +66,7 @@ impl Active {
 
     /// When nothing more of it is sent.
     const fn expires(&self) -> Instant {
-        self.expiry.of(self.setpoint_given.is_some())
+        self.expiry.of(self.has_begun)
     }
 
     pub(super) fn cause(&self) -> Cause {
@@ -102,18 +104,20 @@ impl Supervisor {
             self.conclude_order(asker, &order, Outcome::Refused(refused));
             return false;
         }
-        if matches!(order, Order::Setpoint { .. }) {
-            self.supersede_setpoints();
-        }
+        let drops = matches!(order, Order::Setpoint { .. }) && self.supersede_setpoints();
         // What a group gives its members counts as asked when the group was.
+        let asked_at = Some(leave.map_or(now, |leave| leave.since));
         if order.setpoint().is_some() {
-            self.setpoint_asked_at = Some(leave.map_or(now, |leave| leave.since));
+            self.setpoint_asked_at = asked_at;
+        }
+        if matches!(order, Order::Start { .. }) {
+            self.start_asked_at = asked_at;
         }
         self.enqueue(now, asker, order, leave, expires);
         // A poll gives way once; the next waits for its status, or a stream of orders would blind the fleet.
         let gives_way = self.in_flight.is_some_and(Job::is_poll) && !self.yielded;
         self.yielded |= gives_way;
-        gives_way
+        gives_way || drops
     }
 
     /// An order that is not even taken on.
@@ -168,8 +172,10 @@ impl Supervisor {
         self.drops_for_stop()
     }
 
-    /// Only the latest setpoint counts; what is not yet sent gives its place away.
-    fn supersede_setpoints(&mut self) {
+    /// Only the latest setpoint counts; what is not yet sent gives its place away, and what is being sent as well, or it would be repeated behind
+    /// the latest where its answer was lost. Of two in a row the second is carried out: a stream of setpoints comes to the drive. Gives whether
+    /// the job in flight has to be dropped.
+    fn supersede_setpoints(&mut self) -> bool {
         let is_setpoint = |order: &Order| matches!(order, Order::Setpoint { .. });
         let (older, rest): (VecDeque<_>, VecDeque<_>) =
             std::mem::take(&mut self.queue).into_iter().partition(|queued| is_setpoint(&queued.order));
@@ -177,13 +183,21 @@ impl Supervisor {
         for queued in older {
             self.conclude_order(queued.asker, &queued.order, Outcome::Refused(Refused::Superseded));
         }
+        let may_be_dropped = !self.setpoint_dropped;
         let replaced = self.active.take_if(|active| {
-            is_setpoint(&active.order) && matches!(active.phase, Phase::Prepare | Phase::Verifying { .. })
+            let is_sent = matches!(active.phase, Phase::Sending(Job::SetSetpoint(..)));
+            let waits = matches!(active.phase, Phase::Prepare | Phase::Verifying { .. });
+            is_setpoint(&active.order) && (waits || is_sent && may_be_dropped)
         });
-        if let Some(active) = replaced {
-            let outcome = active.ended_by(Refused::Superseded, Unconfirmed::Superseded);
-            self.conclude_order(active.asker, &active.order, outcome);
+        let Some(active) = replaced else { return false };
+        let is_sent = matches!(active.phase, Phase::Sending(_));
+        if is_sent {
+            // It may stand in the drive or not.
+            (self.given, self.setpoint_dropped) = (None, true);
         }
+        let outcome = active.ended_by(Refused::Superseded, Unconfirmed::Superseded);
+        self.conclude_order(active.asker, &active.order, outcome);
+        is_sent
     }
 
     pub(super) fn enqueue(
@@ -227,11 +241,15 @@ impl Supervisor {
 
     /// How long the calls of the order in flight may wait.
     pub(super) fn order_lifetime(&self, now: Instant) -> Lifetime {
-        let left = |active: &Active| {
-            let is_start = matches!(active.order, Order::Start { .. });
-            active.expiry.left(now, is_start, active.setpoint_given.is_some())
-        };
-        self.active.as_ref().map_or(Expiry::at(now).left(now, false, false), left)
+        let left = |active: &Active| active.expiry.left(now, active.has_begun);
+        self.active.as_ref().map_or(Expiry::at(now).left(now, false), left)
+    }
+
+    /// How what is read on behalf of an order is asked, where one waits for it.
+    pub(super) fn lifetime_of_a_check(&self) -> Option<Lifetime> {
+        let active = self.active.as_ref().filter(|active| active.blocked.is_some())?;
+        let (due, polls_as) = (Some(active.expires()), Some(Class::Command));
+        matches!(active.phase, Phase::Prepare).then_some(Lifetime { due, polls_as, ..Lifetime::default() })
     }
 
     /// The job that the orders want next, and how long it may take.
@@ -251,6 +269,7 @@ impl Supervisor {
                     order,
                     before,
                     expiry: expires,
+                    has_begun: false,
                     setpoint_given: None,
                     armed: false,
                     blocked: None,
@@ -280,6 +299,7 @@ impl Supervisor {
                         // What is started anew is not to be withdrawn any more.
                         self.withdrawal = None;
                     }
+                    self.begin_start();
                     self.set_phase(Phase::Sending(job));
                     return Some((job, None));
                 }
@@ -292,6 +312,8 @@ impl Supervisor {
                 Err(Blocked::For(refused)) => self.end_unsent(now, Outcome::Refused(refused)),
                 Err(Blocked::Until(job, refused)) => {
                     self.block(refused, matches!(job, Job::ArmWatchdog(..)));
+                    self.begin_start();
+                    let expires = self.active.as_ref().map_or(expires, Active::expires);
                     return Some((job, Some(expires)));
                 }
                 Err(Blocked::Meanwhile(refused)) => {
@@ -308,6 +330,13 @@ impl Supervisor {
 
     fn conclude_order(&mut self, asker: Asker, order: &Order, outcome: Outcome) {
         self.conclude(asker, order.command(), order.start_setpoint(), outcome);
+    }
+
+    /// Something is asked for the order that is carried out.
+    fn begin_start(&mut self) {
+        if let Some(active) = &mut self.active {
+            active.has_begun |= matches!(active.order, Order::Start { .. });
+        }
     }
 
     pub(super) fn set_phase(&mut self, phase: Phase) {

@@ -128,9 +128,12 @@ impl Supervisor {
         if leave.is_some_and(is_over) {
             return Some(Refused::Stopped);
         }
-        // Who has been asked for another setpoint since does not come back to this one, and is not started at that one.
-        let is_older =
-            |leave: Leave| leave.brings_setpoint && self.setpoint_asked_at.is_some_and(|at| leave.since < at);
+        // Who has been asked for another setpoint since does not come back to this one, and is not started at that one; who has been started
+        // since is not turned round.
+        let is_older = |leave: Leave| {
+            let since = |at: Option<Instant>| at.is_some_and(|at| leave.since < at);
+            since(self.start_asked_at) || leave.brings_setpoint && since(self.setpoint_asked_at)
+        };
         if leave.is_some_and(is_older) {
             return Some(Refused::Superseded);
         }

@@ -24,6 +24,7 @@ const READ_AGAIN: Duration = Duration::from_millis(100);
 
 impl Supervisor {
     pub(super) fn handle_setpoint_reply(&mut self, now: Instant, result: Result<()>) {
+        self.setpoint_dropped = false;
         let Some(Active { phase: Phase::Sending(Job::SetSetpoint(setpoint, start)), .. }) = self.active
         else {
             return;

@@ -59,6 +59,50 @@ fn the_setpoint_of_a_group_does_not_take_the_place_of_one_that_was_asked_for_sin
     }
 }
 
+/// A group start that has given its setpoint, and a start of one of its drives before the group's turn comes.
+#[test]
+fn a_group_starts_no_drive_that_was_started_since() {
+    for brought in [None, Some(Frequency::from_hertz(20).into())] {
+        let mut rig = Rig::ready();
+        let leave = rig.machine.leave(rig.now, "tester", Direction::Reverse, brought).unwrap();
+        rig.pass(100 * MS);
+        let started = rig.order(START);
+        rig.pass(500 * MS);
+        assert!(rig.outcome(started).is_some_and(Outcome::is_confirmed));
+        let reverse = Order::Start { direction: Direction::Reverse, setpoint: None, until: Until::InForce };
+        let asker = rig.asker();
+        let id = asker.id().expect("it is a caller's");
+        rig.machine.handle_order(rig.now, asker, reverse, Some(leave), None);
+        rig.pass(500 * MS);
+        assert_eq!(rig.outcome(id), Some(&Outcome::Refused(Refused::Superseded)));
+        assert!(!rig.drive.log.contains(&Job::Start(Direction::Reverse)));
+    }
+}
+
+#[test]
+fn a_setpoint_that_is_being_sent_gives_its_place_to_a_later_one_and_a_stream_of_them_comes_to_the_drive() {
+    let mut rig = Rig::ready();
+    rig.drive.log.clear();
+    let first = rig.order(setpoint(31));
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::SetSetpoint(..), .. }));
+    // It is on its way, and its answer is lost.
+    let asker = rig.asker();
+    let second = asker.id().expect("it is a caller's");
+    assert!(rig.machine.handle_order(rig.now, asker, setpoint(22), None, None), "the first is dropped");
+    rig.machine.handle_dropped(rig.now);
+    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::SetSetpoint(..), .. }));
+    let asker = rig.asker();
+    let third = asker.id().expect("it is a caller's");
+    assert!(!rig.machine.handle_order(rig.now, asker, setpoint(23), None, None), "the second is carried out");
+    rig.machine.handle_reply(rig.now, Reply::Setpoint(Ok(())));
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(first), Some(&Outcome::NotConfirmed(Unconfirmed::Superseded)));
+    for id in [second, third] {
+        assert!(rig.outcome(id).is_some_and(Outcome::is_confirmed));
+    }
+    assert_eq!(rig.snapshot().setpoint, Some(Frequency::from_hertz(23).into()));
+}
+
 /// What is shown as its setpoint is what it is started at, whoever has written the reference since; a group has just given it.
 #[test]
 fn a_start_without_a_setpoint_gives_the_one_that_is_shown_anew_and_that_of_a_group_once() {
