@@ -135,12 +135,17 @@ impl Stopping {
     }
 
     /// What the drive shows first behind a time in which nobody saw it. A motor that is driven may be on its ramp still, where its words do not
-    /// tell a stop from a run: the stop is given anew, and nobody is blamed.
-    const fn see_again(&mut self, now: Instant, motion: Motion) {
+    /// tell a stop from a run: the stop is given anew, and nobody is blamed but where the output has risen, which no ramp down does.
+    fn see_again(&mut self, now: Instant, status: &Status, standstill: Duration) {
         if !std::mem::replace(&mut self.was_taken, false) || self.taken {
             return;
         }
-        match motion {
+        let hundredths = |output: Frequency| output.centihertz();
+        let rises = |(lowest, output)| hundredths(output) > hundredths(lowest) + hundredths(PROGRESS);
+        match status.motion {
+            Motion::Driven if self.lowest.zip(status.output_frequency).is_some_and(rises) => {
+                self.is_undone(now, status, standstill);
+            }
             Motion::Driven => self.next_try = Some(now),
             _ => self.taken = true,
         }

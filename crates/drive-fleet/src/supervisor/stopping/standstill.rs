@@ -24,7 +24,7 @@ impl Supervisor {
         if stopping.attempts == 0 {
             return;
         }
-        stopping.see_again(now, motion);
+        stopping.see_again(now, &status.value, standstill);
         let injects = stopping.used == StopMode::DcInjection;
         let injected_for = stopping.injects_since.map(|since| now.saturating_duration_since(since));
         match motion {

@@ -135,6 +135,28 @@ fn a_stop_behind_which_its_line_was_lost_is_given_anew_where_that_does_not_show_
     }
 }
 
+/// It had come down to 30 Hz, and turns at 40 again: somebody else's run command has come meanwhile.
+#[test]
+fn a_motor_that_has_risen_while_its_line_was_lost_amid_its_stop_was_run_by_somebody_else() {
+    let mut rig = running();
+    rig.stop(StopMode::Ramp);
+    for hertz in (30..40).rev() {
+        rig.drive.status.output_frequency = Some(Frequency::from_hertz(hertz));
+        rig.pass(200 * MS);
+    }
+    let before = rig.snapshot().stop.unwrap();
+    assert!(before.taken);
+    if rig.machine.handle_line_lost(rig.now) {
+        rig.machine.handle_dropped(rig.now);
+    }
+    rig.drive.run();
+    while !rig.snapshot().stop.unwrap().taken {
+        rig.pass(10 * MS);
+    }
+    assert_eq!(rig.snapshot().stop.unwrap().undone_since(&before), 1);
+    assert_eq!(rig.drive.writes(), [Job::Stop(StopMode::Ramp); 2]);
+}
+
 #[test]
 fn a_stop_that_is_undone_late_on_its_ramp_is_an_alarm_and_over_as_soon_as_that_is_seen() {
     let mut rig = running();
