@@ -61,6 +61,13 @@ settings! {
     response: Parsed<Time> = "`\"10ms\"`", |to, said| to.response = Some(said.0.0);
     /// extra silence before a request to another drive than the last, for slow adapters
     slave_change_gap: Parsed<Time> = "none", |to, said| to.config.slave_change_gap = said.0.0;
+    /// the longest pause that an adapter makes inside an answer, up to 1 s: what is damaged is given up behind it, and a stop waits for that
+    chunk_gap: Parsed<Time> = "`\"20ms\"`",
+        |to, said| to.config.chunk_gap = within(
+            said.0.0,
+            Duration::from_millis(1)..=Duration::from_secs(1),
+            ", for a stop waits for what is damaged",
+        )?;
     /// ask a USB adapter to deliver at once
     low_latency: bool = "`true`", |to, said| to.config.low_latency = *said;
     /// how many segments the line has: one, and one more behind each repeater; a segment carries 31 drives, with an Altivar 28
