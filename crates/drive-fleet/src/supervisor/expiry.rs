@@ -35,10 +35,10 @@ impl Expiry {
     }
 
     /// What is left of it. Only a start goes on: what is one write is sent in its time or never.
-    pub(super) fn left(self, now: Instant, is_start: bool) -> Lifetime {
-        let until = self.of(is_start);
-        let left = Some(until.saturating_duration_since(now));
-        Lifetime { call: left, all: left, due: Some(until), ..Lifetime::default() }
+    pub(super) fn left(self, now: Instant, is_start: bool, has_begun: bool) -> Lifetime {
+        let left = |until: Instant| Some(until.saturating_duration_since(now));
+        let all = self.of(is_start);
+        Lifetime { call: left(self.of(has_begun)), all: left(all), due: Some(all), ..Lifetime::default() }
     }
 }
 

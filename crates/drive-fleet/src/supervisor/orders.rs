@@ -31,8 +31,6 @@ pub(super) struct Active {
     pub(super) before: Option<Leave>,
     /// When its lifetime is over.
     expiry: Expiry,
-    /// It is a start, and the drive was asked something for it.
-    has_begun: bool,
     /// The setpoint of a start, once it has been given.
     pub(super) setpoint_given: Option<Setpoint>,
     /// The watchdog was written on its behalf.
@@ -66,7 +64,7 @@ impl Active {
 
     /// When nothing more of it is sent.
     const fn expires(&self) -> Instant {
-        self.expiry.of(self.has_begun)
+        self.expiry.of(self.setpoint_given.is_some())
     }
 
     pub(super) fn cause(&self) -> Cause {
@@ -241,8 +239,11 @@ impl Supervisor {
 
     /// How long the calls of the order in flight may wait.
     pub(super) fn order_lifetime(&self, now: Instant) -> Lifetime {
-        let left = |active: &Active| active.expiry.left(now, active.has_begun);
-        self.active.as_ref().map_or(Expiry::at(now).left(now, false), left)
+        let left = |active: &Active| {
+            let is_start = matches!(active.order, Order::Start { .. });
+            active.expiry.left(now, is_start, active.setpoint_given.is_some())
+        };
+        self.active.as_ref().map_or(Expiry::at(now).left(now, false, false), left)
     }
 
     /// How what is read on behalf of an order is asked, where one waits for it.
@@ -269,7 +270,6 @@ impl Supervisor {
                     order,
                     before,
                     expiry: expires,
-                    has_begun: false,
                     setpoint_given: None,
                     armed: false,
                     blocked: None,
@@ -299,7 +299,6 @@ impl Supervisor {
                         // What is started anew is not to be withdrawn any more.
                         self.withdrawal = None;
                     }
-                    self.begin_start();
                     self.set_phase(Phase::Sending(job));
                     return Some((job, None));
                 }
@@ -312,8 +311,6 @@ impl Supervisor {
                 Err(Blocked::For(refused)) => self.end_unsent(now, Outcome::Refused(refused)),
                 Err(Blocked::Until(job, refused)) => {
                     self.block(refused, matches!(job, Job::ArmWatchdog(..)));
-                    self.begin_start();
-                    let expires = self.active.as_ref().map_or(expires, Active::expires);
                     return Some((job, Some(expires)));
                 }
                 Err(Blocked::Meanwhile(refused)) => {
@@ -330,13 +327,6 @@ impl Supervisor {
 
     fn conclude_order(&mut self, asker: Asker, order: &Order, outcome: Outcome) {
         self.conclude(asker, order.command(), order.start_setpoint(), outcome);
-    }
-
-    /// Something is asked for the order that is carried out.
-    fn begin_start(&mut self) {
-        if let Some(active) = &mut self.active {
-            active.has_begun |= matches!(active.order, Order::Start { .. });
-        }
     }
 
     pub(super) fn set_phase(&mut self, phase: Phase) {

@@ -314,7 +314,7 @@ fn an_order_that_waited_is_refused_for_what_is_in_its_way_when_its_time_is_over(
     rig.machine.checks.connected(rig.now);
     rig.machine.checks.handle_identity(rig.now, Ok((rig.drive.identity.clone(), Recognised::CannotTell)));
     assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Watchdog, .. }));
-    rig.now += 3_100 * MS;
+    rig.now += 1_100 * MS;
     let watchdog = rig.drive.watchdog;
     rig.machine.handle_reply(rig.now, Reply::Watchdog(Ok(watchdog)));
     rig.machine.accept_status(rig.now, rig.drive.status.clone());
