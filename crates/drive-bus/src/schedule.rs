@@ -7,8 +7,6 @@
 //!   every other slave has had its first, whatever their deadlines are; one that has not asked for a while begins in the
 //!   present round and has saved nothing up. Inside a round the earliest deadline goes first. What expires unsent has not had
 //!   its turn, so that a line that is too slow for what is asked of it still asks every slave as often as every other.
-//! - **The Commands of an order** stay together: of several the one that [is over](Terms::due) first goes first, or of dialogs, each in its
-//!   turn, none would come to its end within its time.
 //! - **Aging**: whatever has waited for [`Rules::aging`] may take every fourth turn, but never a Stop's. A keep-alive ages
 //!   ten times as fast and goes first among what has aged: behind a stream of commands its drive would trip.
 //! - **One slave's Commands** go ahead of what others wait for sixteen times; from then on Status and KeepAlive have every second
@@ -66,11 +64,9 @@ pub struct Entry<T> {
     pub arrived: Instant,
     /// What is to be done.
     pub work: T,
-    rank: Rank,
+    /// Its place inside its class: the round, then the deadline, then the order of arrival.
+    rank: (u64, Instant, Ticket),
 }
-
-/// A place inside a class: the round, then the deadline, its own or that of the order and whose it is, then the order of arrival.
-type Rank = (u64, Instant, u8, Ticket);
 
 impl<T> Entry<T> {
     /// When it must not be sent any more.
@@ -208,11 +204,8 @@ impl<T> Schedule<T> {
         Ok((ticket, replaced))
     }
 
-    fn rank(&mut self, now: Instant, slave: u8, terms: Terms, ticket: Ticket) -> Rank {
+    fn rank(&mut self, now: Instant, slave: u8, terms: Terms, ticket: Ticket) -> (u64, Instant, Ticket) {
         let current = self.round.get(&terms.class).copied().unwrap_or_default();
-        if let Some(due) = due(terms) {
-            return (current, due, slave, ticket);
-        }
         let round = match self.last_rounds.get(&(terms.class, slave)) {
             Some(last) => current.max(last + 1),
             None => current,
@@ -223,7 +216,7 @@ impl<T> Schedule<T> {
             Class::Command | Class::KeepAlive | Class::Status => Duration::from_secs(1),
             Class::Background => Duration::from_secs(10),
         });
-        (round, now.checked_add(deadline).unwrap_or(now), 0, ticket)
+        (round, now.checked_add(deadline).unwrap_or(now), ticket)
     }
 
     /// Puts back what [`choose`](Self::choose) gave and was not sent after all, at its old place.
@@ -234,9 +227,7 @@ impl<T> Schedule<T> {
     /// Queues once more what was sent in vain: behind the first attempts of the other slaves in its class, so that one
     /// that is dead delays nobody's stop by being asked twice.
     pub fn queue_again(&mut self, mut entry: Entry<T>) {
-        let last = entry.rank.0;
         entry.rank = self.rank(entry.arrived, entry.slave, entry.terms, entry.ticket);
-        entry.rank.0 = entry.rank.0.max(last + 1);
         self.queued.push(entry);
     }
 
@@ -254,7 +245,7 @@ impl<T> Schedule<T> {
     /// Takes out what has outlived its lifetime. It has not had its turn: the next of that slave has it.
     pub fn expired(&mut self, now: Instant) -> Vec<Entry<T>> {
         let expired = self.withdraw_all(|entry| entry.expires().is_some_and(|expires| expires <= now));
-        for entry in expired.iter().filter(|entry| due(entry.terms).is_none()) {
+        for entry in &expired {
             let key = (entry.terms.class, entry.slave);
             if self.last_rounds.get(&key) == Some(&entry.rank.0) {
                 match entry.rank.0.checked_sub(1) {
@@ -383,14 +374,6 @@ impl<T> Schedule<T> {
         let others_wait =
             class == Class::Command && self.queued.iter().any(|entry| asks_for_another(slave, entry));
         self.shares.count(now, class, slave, others_wait);
-    }
-}
-
-/// When the order is over of which a Command is a part.
-const fn due(terms: Terms) -> Option<Instant> {
-    match terms.class {
-        Class::Command => terms.due,
-        _ => None,
     }
 }
 

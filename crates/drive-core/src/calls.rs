@@ -15,7 +15,7 @@ use tokio_modbus::{Request, Response};
 use crate::{
     confirm::{Confirming, later},
     error::{BUSY, Error, ErrorKind, Exchange, Result},
-    port::{Class, Effect, Port, PortError, Terms},
+    port::{Effect, Port, PortError, Terms},
 };
 
 pub use self::{lifetimes::Lifetimes, slave::Registers};
@@ -100,14 +100,11 @@ impl<P: Port> Calls<'_, P> {
         if let (Ok(Ok(_)), Some(at)) = (&outcome, self.registers.port.asked_at()) {
             self.registers.see(at);
         }
-        let outcome = match outcome {
+        match outcome {
             Ok(Ok(response)) => Ok(response),
             Ok(Err(exception)) => Err(self.exception(exchange, exception.into())),
             Err(error) => Err(self.port_error(exchange, PortError::from_modbus(error))),
-        };
-        let is_sent = outcome.as_ref().err().is_none_or(|error| error.kind() != ErrorKind::NotSent);
-        self.registers.asked |= terms.class == Class::Command && is_sent;
-        outcome
+        }
     }
 
     /// An answer that breaks what the manual says.

@@ -91,24 +91,13 @@ pub struct Terms {
     /// any more once a stop was written to its slave since, by whomever: it ends with [`PortError::Superseded`], so that nobody's
     /// start goes on behind somebody else's stop. `None`: it is an order by itself.
     pub begun: Option<Instant>,
-    /// When that order is over. Of the orders that are under way on a line at once what the one asks that is over first goes first, in
-    /// [`Class::Command`]: by turns none of them would come to its end in its time. `None`: by turns.
-    pub due: Option<Instant>,
 }
 
 impl Terms {
     /// The terms of a class, without a lifetime, for levels, replaced by nothing.
     #[must_use]
     pub const fn of(class: Class) -> Self {
-        Self {
-            class,
-            lifetime: None,
-            effect: Effect::Level,
-            replaces: None,
-            spare_words: 0,
-            begun: None,
-            due: None,
-        }
+        Self { class, lifetime: None, effect: Effect::Level, replaces: None, spare_words: 0, begun: None }
     }
 
     /// These terms with a lifetime.

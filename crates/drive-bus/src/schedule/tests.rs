@@ -41,54 +41,6 @@ fn inside_a_class_the_earliest_deadline_goes_first() {
     assert_eq!(order(&mut schedule, now), [2, 3, 1]);
 }
 
-/// Five starts of thirty requests each, of which two have time: each asks for one thing after the other.
-#[test]
-fn of_several_orders_the_one_that_is_over_first_comes_to_its_end_first() {
-    let (mut schedule, start) = (schedule(), Instant::now());
-    let due = |slave: u8| Some(start + 3_000 * MS + u32::from(slave) * MS / 10);
-    let mut left = [30; 5];
-    let mut ended = Vec::new();
-    for turn in 0..150 {
-        let now = start + MS + turn * 20 * MS;
-        for slave in (0..5_u8).filter(|slave| left[usize::from(*slave)] > 0) {
-            let waits = schedule.any(|entry| entry.slave == slave);
-            if !waits {
-                let terms = Terms { due: due(slave), ..Terms::of(Class::Command) };
-                push(&mut schedule, now, slave, terms, u32::from(slave));
-            }
-        }
-        let ready = Readiness { at: now, takes: 20 * MS, holds_line: false };
-        let Chosen::Send(entry) = schedule.choose(now, |_| ready) else { panic!("each asks") };
-        let left = &mut left[usize::from(entry.slave)];
-        *left -= 1;
-        if *left == 0 {
-            ended.push((entry.slave, turn));
-        }
-    }
-    // What has waited for a second has a turn now and then.
-    assert!(ended.iter().map(|(slave, _)| *slave).eq(0..5), "{ended:?}");
-    let (first, second) = (ended[0].1, ended[1].1);
-    assert!(first == 29 && second < 70, "{ended:?}");
-}
-
-#[test]
-fn what_an_order_asked_in_vain_goes_behind_what_the_others_ask() {
-    let (mut schedule, now) = (schedule(), Instant::now());
-    let terms = Terms { due: Some(now), ..Terms::of(Class::Command) };
-    push(&mut schedule, now, 1, terms, 1);
-    let Chosen::Send(entry) =
-        schedule.choose(now, |_| Readiness { at: now, takes: 20 * MS, holds_line: false })
-    else {
-        panic!("it waits")
-    };
-    schedule.queue_again(entry);
-    for slave in 2..4 {
-        let later = Terms { due: Some(now + MS), ..Terms::of(Class::Command) };
-        push(&mut schedule, now + MS, slave, later, u32::from(slave));
-    }
-    assert_eq!(order(&mut schedule, now + MS), [2, 3, 1]);
-}
-
 #[test]
 fn a_slave_with_many_requests_does_not_starve_the_others() {
     let (mut schedule, now) = (schedule(), Instant::now());

@@ -28,8 +28,6 @@ pub struct Lifetimes {
     /// When a command of which nothing was written is not sent any more, for one whose further words belong to the first: an edge that has
     /// risen is to fall. Never by default.
     pub begun_until: Option<Instant>,
-    /// When the order is over of which the calls are a part, see [`Terms::due`](crate::Terms::due).
-    pub due: Option<Instant>,
     /// Keep-alives.
     pub keep_alive: Option<Duration>,
     /// Status polls; a daemon sets its poll period.
@@ -37,7 +35,7 @@ pub struct Lifetimes {
     /// Parameters, histories, slow measurements.
     pub background: Option<Duration>,
     /// The class in which what polls and identifies is asked instead of its own: [`Class::Stop`] where a stop waits for what it tells,
-    /// so that it goes to a slave that is off-line as the stop itself would, [`Class::Command`] where an order does.
+    /// so that it goes to a slave that is off-line as the stop itself would.
     pub polls_as: Option<Class>,
 }
 
@@ -62,7 +60,6 @@ impl Default for Lifetimes {
             command: Some(Duration::from_secs(1)),
             command_until: None,
             begun_until: None,
-            due: None,
             keep_alive: None,
             status: None,
             background: None,

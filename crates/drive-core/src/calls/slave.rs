@@ -9,7 +9,7 @@ use super::{Calls, Lifetimes};
 use crate::{
     address::SlaveAddress,
     capabilities::Capabilities,
-    confirm::{CONFIRMED_WITHIN, later},
+    confirm::CONFIRMED_WITHIN,
     error::{Error, ExceptionMeaning, Result},
     kept_readings::KeptReadings,
     port::{Class, Port, Terms},
@@ -38,8 +38,6 @@ pub struct Registers<P> {
     judged_until: Option<Instant>,
     /// Something of the order was written, or may have been.
     pub(super) written: bool,
-    /// Something of it was sent.
-    pub(super) asked: bool,
     /// How long calls may wait.
     pub lifetimes: Lifetimes,
     /// What long jobs have read that were cut.
@@ -75,7 +73,6 @@ impl<P: Port> Registers<P> {
             begun: None,
             judged_until: None,
             written: false,
-            asked: false,
             lifetimes,
             kept,
             follower: None,
@@ -115,8 +112,7 @@ impl<P: Port> Registers<P> {
             (Class::Status | Class::Background, Some(asked_as)) => asked_as,
             _ => class,
         };
-        let due = if matches!(asked_as, Class::Command) { self.lifetimes.due } else { None };
-        let terms = Terms { lifetime: self.lifetimes.of(class), begun, due, ..Terms::of(asked_as) };
+        let terms = Terms { lifetime: self.lifetimes.of(class), begun, ..Terms::of(asked_as) };
         Calls { registers: self, terms }
     }
 
@@ -124,7 +120,7 @@ impl<P: Port> Registers<P> {
     /// somebody else's that comes meanwhile, see [`Terms::begun`]. **Whatever writes in the class of commands begins an order**, or it
     /// is taken for a part of the one before.
     pub fn begin_order(&mut self) {
-        (self.judged_until, self.written, self.asked) = (None, false, false);
+        (self.judged_until, self.written) = (None, false);
         self.begun = Some(Instant::now());
     }
 
@@ -142,22 +138,14 @@ impl<P: Port> Registers<P> {
         if judges { Terms { lifetime: None, ..terms } } else { self.bounded(terms) }
     }
 
-    /// A call that dies is sent in the time of its command, too. The first one of an order is sent in its own time; the others have that of the
-    /// order, where others' orders go before them.
+    /// A call that dies is sent in the time of its command, too.
     pub(super) fn bounded(&self, terms: Terms) -> Terms {
-        let now = Instant::now();
         let begun_until = self.lifetimes.begun_until.filter(|_| !self.written);
         let until = [self.lifetimes.command_until, begun_until].into_iter().flatten().min();
         let until = until.filter(|_| terms.class == Class::Command);
-        let left = until.map(|until| until.saturating_duration_since(now));
-        let goes_on = self.asked && terms.due.is_some();
-        let lifetime = terms.lifetime.map(|lifetime| match left {
-            Some(left) if goes_on => left,
-            left => left.map_or(lifetime, |left| lifetime.min(left)),
-        });
-        let first = lifetime.filter(|_| !goes_on).map(|lifetime| later(now, lifetime));
-        let due = terms.due.map(|due| first.map_or(due, |first| due.min(first)));
-        Terms { lifetime, due, ..terms }
+        let left = until.map(|until| until.saturating_duration_since(Instant::now()));
+        let lifetime = terms.lifetime.map(|lifetime| left.map_or(lifetime, |left| lifetime.min(left)));
+        Terms { lifetime, ..terms }
     }
 
     /// What is read from here on makes one picture of the drive, which is as old as its oldest answer.

@@ -128,29 +128,6 @@ async fn a_command_that_has_not_begun_in_time_is_not_written_and_one_that_has_is
     }
 }
 
-/// Behind its first call the dialogs of others may go before it.
-#[tokio::test(start_paused = true)]
-async fn the_first_call_of_an_order_is_sent_in_its_own_time_and_the_others_in_that_of_the_order() {
-    let mut registers = registers([], 0);
-    let over = Instant::now() + Duration::from_secs(3);
-    registers.lifetimes.command_until = Some(over);
-    registers.lifetimes.due = Some(over);
-    let asked = |registers: &mut Registers<Script>| {
-        let terms = registers.at(Class::Command).terms;
-        let terms = registers.bounded(terms);
-        (terms.lifetime, terms.due)
-    };
-    for _ in 0..2 {
-        registers.begin_order();
-        let first = Instant::now() + Duration::from_secs(1);
-        assert_eq!(asked(&mut registers), (Some(Duration::from_secs(1)), Some(first)));
-        registers.at(Class::Command).read(CMD).await.unwrap();
-        let left = over - Instant::now();
-        assert_eq!(asked(&mut registers), (Some(left), Some(over)));
-        tokio::time::sleep(Duration::from_millis(500)).await;
-    }
-}
-
 #[tokio::test(start_paused = true)]
 async fn a_write_that_was_accepted_and_takes_long_is_known_once_it_is_read_back() {
     let mut registers = registers([ExceptionCode::Acknowledge], 3);

@@ -131,7 +131,6 @@ impl Supervisor {
             Job::SetSetpoint(..) | Job::Start(_) | Job::ResetFaults | Job::Release | Job::Persist => {
                 self.order_lifetime(now)
             }
-            Job::Watchdog | Job::Identify => self.lifetime_of_a_check().unwrap_or_default(),
             _ => Lifetime::default(),
         }
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::{Class, later};
+use drive_core::later;
 use tokio::time::Instant;
 
 /// How much longer than its lifetime what a start has to write behind its first word may take, where whoever gave it has said no time: a
@@ -37,8 +37,8 @@ impl Expiry {
     /// What is left of it. Only a start goes on: what is one write is sent in its time or never.
     pub(super) fn left(self, now: Instant, is_start: bool, has_begun: bool) -> Lifetime {
         let left = |until: Instant| Some(until.saturating_duration_since(now));
-        let all = self.of(is_start);
-        Lifetime { call: left(self.of(has_begun)), all: left(all), due: Some(all), ..Lifetime::default() }
+        let all = if is_start { self.sent } else { self.begun };
+        Lifetime { call: left(self.of(has_begun)), all: left(all), ..Lifetime::default() }
     }
 }
 
@@ -49,16 +49,13 @@ pub(crate) struct Lifetime {
     pub(crate) call: Option<Duration>,
     /// All of its calls together, until the last is.
     pub(crate) all: Option<Duration>,
-    /// When the order is over of which they are.
-    pub(crate) due: Option<Instant>,
-    /// As whose readings it asks where somebody waits for what it tells: a stop, or an order.
-    pub(crate) polls_as: Option<Class>,
+    /// A stop waits for what it tells.
+    pub(crate) is_for_a_stop: bool,
 }
 
 impl Lifetime {
     /// It waits for as long as a stop does.
-    pub(super) const FOR_A_STOP: Self =
-        Self { call: None, all: None, due: None, polls_as: Some(Class::Stop) };
+    pub(super) const FOR_A_STOP: Self = Self { call: None, all: None, is_for_a_stop: true };
 
     /// A part of it is over already.
     pub(crate) fn without(self, time: Duration) -> Self {

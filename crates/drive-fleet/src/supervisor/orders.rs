@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use drive_core::{Class, Error, Setpoint, StopMode};
+use drive_core::{Error, Setpoint, StopMode};
 use tokio::time::Instant;
 
 use super::{Asker, CallId, Expiry, Job, Leave, Lifetime, Supervisor, permission::Blocked};
@@ -244,13 +244,6 @@ impl Supervisor {
             active.expiry.left(now, is_start, active.setpoint_given.is_some())
         };
         self.active.as_ref().map_or(Expiry::at(now).left(now, false, false), left)
-    }
-
-    /// How what is read on behalf of an order is asked, where one waits for it.
-    pub(super) fn lifetime_of_a_check(&self) -> Option<Lifetime> {
-        let active = self.active.as_ref().filter(|active| active.blocked.is_some())?;
-        let (due, polls_as) = (Some(active.expires()), Some(Class::Command));
-        matches!(active.phase, Phase::Prepare).then_some(Lifetime { due, polls_as, ..Lifetime::default() })
     }
 
     /// The job that the orders want next, and how long it may take.

@@ -239,10 +239,6 @@ impl Supervisor {
             return Err(reason.into());
         }
         let unverified = Refused::WatchdogUnverified;
-        let is_old = active.is_some() && status.is_undriven() && self.checks.was_verified_long_ago(now);
-        if crate::mutant!("watchdog-of-before-believed", is_old, false) {
-            return Err(Blocked::Until(Job::Watchdog, unverified));
-        }
         match self.checks.watchdog() {
             check if crate::mutant!("unwatched-moved", check.allows_motion(), true) => Ok(()),
             // It is written for an order once.

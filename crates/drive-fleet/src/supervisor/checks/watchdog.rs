@@ -16,8 +16,6 @@ use crate::{
 
 /// How often a drive may refuse that its watchdog is set up, a second apart, until that is an alarm.
 const REFUSALS: u8 = 10;
-/// For how long a start takes a watchdog for what it was seen to be: somebody at the keypad of a motor that stands may set it otherwise.
-const HOLDS: Duration = Duration::from_secs(10);
 
 impl Checks {
     pub(crate) const fn watchdog(&self) -> &WatchdogCheck {
@@ -36,12 +34,6 @@ impl Checks {
             WatchdogCheck::NoContract { found } => found.is_none(),
             WatchdogCheck::WaitsForStandstill(_) | WatchdogCheck::Verified(_) => false,
         }
-    }
-
-    /// Whether a start wants it to be read once more.
-    pub(crate) fn was_verified_long_ago(&self, now: Instant) -> bool {
-        matches!(self.watchdog, WatchdogCheck::Verified(_))
-            && self.verified_at.is_none_or(|at| now.saturating_duration_since(at) >= HOLDS)
     }
 
     /// The question how the watchdog is set, if it is due.
@@ -89,11 +81,9 @@ impl Checks {
             Ok(watchdog) if self.keeps(watchdog, contract) => {
                 self.armed = true;
                 self.written |= written;
-                self.verified_at = Some(now);
-                let verified = WatchdogCheck::Verified(watchdog);
-                let is_news = std::mem::replace(&mut self.watchdog, verified.clone()) != verified;
+                self.watchdog = WatchdogCheck::Verified(watchdog);
                 let before = self.to_keep(watchdog);
-                is_news.then_some(EventKind::WatchdogVerified { watchdog, written, before })
+                Some(EventKind::WatchdogVerified { watchdog, written, before })
             }
             Ok(watchdog) if control && self.settable && !written && !self.in_vain => {
                 self.watchdog = WatchdogCheck::WaitsForStandstill(watchdog);

@@ -469,46 +469,6 @@ fn a_watchdog_that_is_changed_under_a_contract_is_told_and_nothing_starts_before
     assert!(matches!(rig.snapshot().watchdog, WatchdogCheck::Broken(_)));
 }
 
-/// At the keypad of a motor that stands, and nothing has told it yet.
-#[test]
-fn a_watchdog_that_was_set_otherwise_since_it_was_verified_is_set_up_before_the_start_or_forbids_it() {
-    for takes_it in [true, false] {
-        let mut rig = Rig::ready();
-        rig.pass(10_000 * MS);
-        let contract = rig.drive.watchdog;
-        rig.drive.watchdog = Watchdog { timeout: None, reaction: None };
-        rig.drive.keeps_watchdog = !takes_it;
-        rig.drive.log.clear();
-        let start = rig.order(START);
-        rig.pass(3_000 * MS);
-        if takes_it {
-            assert_eq!(rig.drive.writes().len(), 2, "the watchdog, and the start: {:?}", rig.drive.writes());
-            assert_eq!(rig.drive.watchdog, contract);
-            assert!(matches!(rig.outcome(start), Some(Outcome::Started { .. })));
-        } else {
-            assert_eq!(rig.outcome(start), Some(&Outcome::Refused(Refused::WatchdogUnverified)));
-            assert!(!rig.drive.log.contains(&Job::Start(Direction::Forward)));
-        }
-    }
-}
-
-#[test]
-fn a_watchdog_is_read_once_for_starts_within_ten_seconds_and_told_once() {
-    let mut rig = Rig::ready();
-    rig.pass(10_000 * MS);
-    rig.outputs.clear();
-    rig.drive.log.clear();
-    for _ in 0..2 {
-        rig.order(START);
-        rig.pass(500 * MS);
-        rig.stop(StopMode::Ramp);
-        rig.pass(2_000 * MS);
-    }
-    let readings = rig.drive.log.iter().filter(|job| **job == Job::Watchdog).count();
-    assert_eq!(readings, 1, "{:?}", rig.drive.log);
-    assert!(!rig.events().contains(&"watchdog verified"), "{:?}", rig.events());
-}
-
 #[test]
 fn a_watchdog_that_is_changed_under_a_motor_that_turns_is_an_alarm() {
     let mut rig = Rig::ready();
