@@ -22,6 +22,9 @@ const AGAIN_MS = 500;
 const GIVE_UP_MS = 60_000;
 /** What comes to a drive later than this after it was pressed is nobody's wish any more: a network may have kept it. */
 const EXPIRES_MS = 5_000;
+/** Several are commanded by turns, and a start asks its drive for much: each but the first has so much more, as far as the daemon takes it. */
+const EACH_MORE_MS = 1_000;
+const LONGEST_MS = 10_000;
 
 const orders = [];
 const listeners = new Set();
@@ -40,7 +43,9 @@ export function onOrder(listener) {
 /** Gives a command at this address, and ends when its outcome is known; what becomes of it later is told all the same. All but a stop expire. */
 export function command(to, action, where, asked = {}) {
   const id = commandId();
-  const body = action === 'stop' ? asked : { expires_in_ms: EXPIRES_MS, issued_unix_ms: Math.round(daemonNow()), ...asked };
+  const more = EACH_MORE_MS * ((asked.drives?.length ?? 1) - 1);
+  const expires_in_ms = Math.min(EXPIRES_MS + more, LONGEST_MS);
+  const body = action === 'stop' ? asked : { expires_in_ms, issued_unix_ms: Math.round(daemonNow()), ...asked };
   const within = action === 'stop' ? ATTEMPT_MS : undefined;
   return carryOut(to, action, () => post(`${where}?wait=0`, { id, ...body }, 'POST', within), id);
 }
