@@ -378,7 +378,8 @@ impl DriveHandle {
     }
 
     /// Gives an order that somebody gave then, with another lifetime than that of the settings: nothing of it is written behind its end. A
-    /// start for which its drive was asked something by then, as one that takes long to answer is, goes on for 2 s at the most.
+    /// start for which its drive was asked something by then, as one that takes long to answer is, or that waited for others of its line that
+    /// start, goes on for 2 s at the most.
     pub fn order_since(&self, order: Order, given: Instant, lifetime: Duration) -> Ticket {
         self.order_on(None, Some(Expiry::since(given, lifetime)), order)
     }

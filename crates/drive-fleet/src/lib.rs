@@ -66,6 +66,7 @@ mod place;
 mod plan;
 mod progress;
 mod round;
+mod row;
 mod runs;
 mod settings;
 mod shown_identity;

@@ -15,8 +15,10 @@ pub(crate) struct LineEntry {
     plan: Mutex<LinePlan>,
     /// When the commands of groups may use it again; who holds it is using it.
     pub(crate) commands: tokio::sync::Mutex<Instant>,
-    /// The turn that its drives take one after the other.
+    /// The turn that its drives take one after the other at what takes many exchanges of the lowest class.
     pub(crate) turns: Arc<Semaphore>,
+    /// The turn that they take to start: each reads some thirty registers for it, and if all did it at once none would be done in time.
+    pub(crate) starts: Arc<Semaphore>,
 }
 
 impl LineEntry {
@@ -28,6 +30,7 @@ impl LineEntry {
             plan: Mutex::new(plan),
             commands: tokio::sync::Mutex::new(Instant::now()),
             turns: Arc::new(Semaphore::new(1)),
+            starts: Arc::new(Semaphore::new(1)),
         }
     }
 

@@ -264,7 +264,7 @@ times! {
     /// How long the commands of a drive may take.
     pub struct Times {
         /// From the call until it is sent; what is not sent by then never is (rule 2). A start that has begun by then, for which its drive was
-        /// asked something, goes on for 2 s at the most.
+        /// asked something, or that waits for others of its line that start, goes on for 2 s at the most.
         pub lifetime as "lifetime_ms": 1_000,
         /// From sending until the drive's words show that it took effect: run command in force, fault gone, and where an
         /// answer was lost the time to find out. An Altivar 21 is deaf for 2 s after a reset.

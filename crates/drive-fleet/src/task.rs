@@ -1,18 +1,12 @@
 //! The task of one drive: it owns the conversation and does what the supervisor says.
 
-use std::{
-    collections::BTreeMap,
-    panic::AssertUnwindSafe,
-    pin::{Pin, pin},
-    sync::Arc,
-    time::Duration,
-};
+use std::{collections::BTreeMap, panic::AssertUnwindSafe, pin::pin, sync::Arc, time::Duration};
 
 use drive_bus::{Latest, Slave};
 use drive_core::{Drive, Followed, Lease, panic_said};
 use futures_util::{FutureExt, future::poll_immediate};
 use tokio::{
-    sync::{AcquireError, OwnedSemaphorePermit, Semaphore, mpsc, oneshot, watch},
+    sync::{mpsc, oneshot, watch},
     time::{Instant, sleep, sleep_until},
 };
 
@@ -25,6 +19,7 @@ use crate::{
     place::Place,
     progress::{Progress, Report},
     round::Round,
+    row::Row,
     runs::Keeper,
     settings::{DriveSettings, Left},
     snapshot::Snapshot,
@@ -41,7 +36,9 @@ pub(crate) struct Task {
     pub(crate) messages: mpsc::Receiver<Message>,
     pub(crate) urgent: mpsc::UnboundedReceiver<Urgent>,
     /// The turn that the drives of a line take one after the other.
-    pub(crate) turns: Arc<Semaphore>,
+    pub(crate) turns: Row,
+    /// The turn that they take to start.
+    pub(crate) starts: Row,
     pub(crate) keeper: Keeper,
     /// What its line says of its answers.
     pub(crate) answers: Slave,
@@ -51,7 +48,7 @@ impl Task {
     /// Runs until the fleet has shut down, or nobody holds it any more and each stop that was given has ended. **No panic ends it**: a motor whose driver has a fault is to be
     /// stopped all the same.
     pub(crate) async fn run(self) {
-        let Self { drive, desk, messages, urgent, turns, keeper, answers } = self;
+        let Self { drive, desk, messages, urgent, turns, starts, keeper, answers } = self;
         let (losses, retractions) = (answers.port_losses(), answers.retractions());
         let (follower, followed) = watch::channel(None);
         let mut driver = Driver::new(drive);
@@ -64,6 +61,7 @@ impl Task {
             held: true,
             urgent,
             turns,
+            starts,
             keeper,
             answers,
             losses,
@@ -89,7 +87,8 @@ struct Talk {
     /// Somebody holds the fleet.
     held: bool,
     urgent: mpsc::UnboundedReceiver<Urgent>,
-    turns: Arc<Semaphore>,
+    turns: Row,
+    starts: Row,
     keeper: Keeper,
     answers: Slave,
     losses: Latest<u64>,
@@ -109,15 +108,13 @@ impl Talk {
             held,
             urgent,
             turns,
+            starts,
             keeper,
             answers,
             losses,
             retractions,
             followed,
         } = self;
-        // Kept across the steps, so that a drive does not lose its place in the row.
-        let mut waits_for_turn = None;
-        let mut turn: Option<OwnedSemaphorePermit> = None;
         loop {
             if let Some(settings) = desk.settings.take() {
                 driver.configure(&settings);
@@ -156,6 +153,19 @@ impl Talk {
                 desk.supervisor.note_panic(said);
             }
             let step = desk.supervisor.next(Instant::now());
+            match desk.supervisor.start_turn() {
+                Turn::Unwanted => starts.leave(),
+                Turn::Wanted if starts.stand() => desk.supervisor.handle_row(),
+                Turn::Wanted | Turn::Granted => {}
+            }
+            let on_turn = matches!(step, Step::Do { on_turn: true, .. });
+            match desk.supervisor.turn() {
+                Turn::Unwanted if !on_turn => turns.leave(),
+                Turn::Wanted => {
+                    turns.stand();
+                }
+                Turn::Unwanted | Turn::Granted => {}
+            }
             if let Step::Do { job: Job::Start(direction), .. } = step
                 && let Some(word) = driver.run_word_for(direction)
             {
@@ -174,17 +184,6 @@ impl Talk {
                     (Some(driver.carry_out(keeper, job, lifetime, identity)), until)
                 }
             };
-            let on_turn = matches!(step, Step::Do { on_turn: true, .. });
-            match desk.supervisor.turn() {
-                Turn::Unwanted if !on_turn => {
-                    waits_for_turn = None;
-                    drop(turn.take());
-                }
-                Turn::Wanted if waits_for_turn.is_none() => {
-                    waits_for_turn = Some(Box::pin(Arc::clone(turns).acquire_owned()));
-                }
-                _ => {}
-            }
             let talking = call.is_some();
             let mut call = pin!(async {
                 match call {
@@ -247,9 +246,8 @@ impl Talk {
                         }
                         false
                     }
-                    granted = next_turn(&mut waits_for_turn) => {
-                        waits_for_turn = None;
-                        turn = granted;
+                    () = starts.come() => desk.supervisor.grant_start_turn(),
+                    () = turns.come() => {
                         desk.supervisor.grant_turn();
                         // A poll in flight is not disturbed by it.
                         if talking {
@@ -285,7 +283,7 @@ impl Talk {
                 desk.tell();
             }
             if on_turn {
-                drop(turn.take());
+                turns.leave();
             }
         }
     }
@@ -319,18 +317,6 @@ async fn passing(at: Option<Instant>) {
 async fn all_are_given(round: &mut Option<Round>) {
     match round {
         Some(round) => round.all_are_given().await,
-        None => std::future::pending().await,
-    }
-}
-
-/// The turn of a drive that waits for it, and for ever otherwise.
-async fn next_turn<F>(waits: &mut Option<Pin<Box<F>>>) -> Option<OwnedSemaphorePermit>
-where
-    F: Future<Output = Result<OwnedSemaphorePermit, AcquireError>>,
-{
-    match waits {
-        // Nobody closes the row.
-        Some(waits) => waits.await.ok(),
         None => std::future::pending().await,
     }
 }

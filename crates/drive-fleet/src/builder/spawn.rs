@@ -17,6 +17,7 @@ use crate::{
     handle::Entry,
     line_entry::LineEntry,
     place::Place,
+    row::Row,
     runs::Keeper,
     supervisor::Supervisor,
     task::{Desk, Task},
@@ -57,9 +58,9 @@ pub(super) fn spawn(member: Member, events: &Teller, line: Arc<LineEntry>) -> Ar
         settings: Some(Arc::clone(&settings)),
         round: None,
     };
-    let turns = Arc::clone(&line.turns);
+    let [turns, starts] = [&line.turns, &line.starts].map(Row::of);
     tokio::spawn(
-        Task { drive, desk, messages: message_box, urgent: urgent_box, turns, keeper, answers }.run(),
+        Task { drive, desk, messages: message_box, urgent: urgent_box, turns, starts, keeper, answers }.run(),
     );
     Arc::new(Entry {
         name,

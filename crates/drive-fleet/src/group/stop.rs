@@ -64,19 +64,17 @@ impl Group {
         let (mut broadcasts, round) = (Vec::new(), Round::begin());
         let mut each = Vec::with_capacity(count);
         for of_line in &mut lines {
-            // Whoever stands needs no word before those that turn have theirs.
-            let stands = |member: &DriveHandle| {
-                member.entry.snapshots.now().status.as_ref().is_some_and(|status| status.value.is_undriven())
-            };
-            of_line.members.sort_by_key(|(_, member)| stands(member));
-            let of_line = &*of_line;
-            let OfLine { line, members } = of_line;
             // It is first on the line, and no start of before can come behind the stops of each.
+            let line = of_line.line;
             if let Some(write) = of_line.common_write(&standing, order.mode).filter(|_| by_broadcast) {
                 broadcasts.push((Arc::clone(&line.name), self.broadcast(line, write)));
             }
-            let is_silent = |member: &DriveHandle| member.entry.snapshots.now().link != Link::Connected;
-            let silent = members.iter().map(|(_, member)| u32::from(is_silent(member))).sum();
+            // Those that are seen to turn, then those of which nobody knows: whoever stands needs no word before they have theirs.
+            of_line.members.sort_by_cached_key(|(_, member)| Urgency::of(member));
+            let members = &of_line.members;
+            let is_silent = |(_, member): &&(usize, &DriveHandle)| Urgency::of(member) == Urgency::Unseen;
+            let silent = members.iter().filter(is_silent).count();
+            let silent = u32::try_from(silent).unwrap_or(u32::MAX);
             let patience = line.plan().stop_all(MUTE.max(silent)) + line.line.worst_case_stop();
             for (number, member) in members {
                 let stop = member.stop_within(order, Some(patience), Some(round.part()));
@@ -104,6 +102,25 @@ impl Group {
             self.fleet.inner.runtime.spawn(sending);
         }
         sent
+    }
+}
+
+/// In which order the drives of a line are stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Urgency {
+    Turns,
+    Unseen,
+    Stands,
+}
+
+impl Urgency {
+    fn of(member: &DriveHandle) -> Self {
+        let snapshot = member.entry.snapshots.now();
+        match &snapshot.status {
+            Some(status) if snapshot.link == Link::Connected && status.value.is_undriven() => Self::Stands,
+            Some(_) if snapshot.link == Link::Connected => Self::Turns,
+            _ => Self::Unseen,
+        }
     }
 }
 

@@ -18,6 +18,10 @@ impl Supervisor {
         }
         self.turn_ends = None;
         let urgent = self.choose(now);
+        // Whose turn it is to start is seen before anything else is begun.
+        if urgent.is_none() && self.active.as_ref().is_some_and(Active::asks_for_turn) {
+            return Step::Wait(now);
+        }
         let Some((job, until)) = urgent.or_else(|| self.choose_background(now)) else {
             return Step::Wait(self.wake_at(now));
         };
@@ -56,6 +60,9 @@ impl Supervisor {
         }
         if let Some(order) = self.order_job(now) {
             return Some(order);
+        }
+        if self.active.as_ref().is_some_and(Active::asks_for_turn) {
+            return None;
         }
         // Behind the orders, whose own frames feed the drive as well.
         if hungry {
@@ -102,6 +109,23 @@ impl Supervisor {
     /// The drive has its turn.
     pub(crate) const fn grant_turn(&mut self) {
         self.turn = Turn::Granted;
+    }
+
+    /// Whether the drive wants the turn in which those of its line start, one after the other.
+    pub(crate) fn start_turn(&self) -> Turn {
+        self.active.as_ref().map_or(Turn::Unwanted, Active::start_turn)
+    }
+
+    /// The drive has the turn to start. Gives whether the job in flight has to be dropped for it.
+    pub(crate) fn grant_start_turn(&mut self) -> bool {
+        self.active.as_mut().map(Active::grant_turn).is_some() && self.poll_gives_way()
+    }
+
+    /// Others of its line are before it.
+    pub(crate) fn handle_row(&mut self) {
+        if let Some(active) = &mut self.active {
+            active.stand_in_row();
+        }
     }
 
     fn background_job(&self, now: Instant) -> Option<Job> {

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use drive_core::{Error, Setpoint, StopMode};
 use tokio::time::Instant;
 
-use super::{Asker, CallId, Expiry, Job, Leave, Lifetime, Supervisor, permission::Blocked};
+use super::{Asker, CallId, Expiry, Job, Leave, Lifetime, Supervisor, Turn, permission::Blocked};
 use crate::{
     cause::{Cause, Policy},
     outcome::{Order, Outcome, Refused, Unconfirmed},
@@ -37,6 +37,10 @@ pub(super) struct Active {
     pub(super) armed: bool,
     /// Why it could not be sent yet.
     blocked: Option<Refused>,
+    /// Whether it has the turn at which the drives of its line start.
+    turn: Turn,
+    /// It has waited for that, and not for a line on which nothing goes on.
+    stood_in_row: bool,
     pub(super) phase: Phase,
 }
 
@@ -64,7 +68,33 @@ impl Active {
 
     /// When nothing more of it is sent.
     const fn expires(&self) -> Instant {
-        self.expiry.of(self.setpoint_given.is_some())
+        self.expiry.of(self.has_begun())
+    }
+
+    /// Whether something of it was sent, or would have been were it not for others of its line.
+    const fn has_begun(&self) -> bool {
+        self.setpoint_given.is_some() || self.stood_in_row
+    }
+
+    pub(super) const fn is_start(&self) -> bool {
+        matches!(self.order, Order::Start { .. })
+    }
+
+    pub(super) const fn start_turn(&self) -> Turn {
+        self.turn
+    }
+
+    /// Whether nobody has said yet if it is its turn.
+    pub(super) fn asks_for_turn(&self) -> bool {
+        self.turn == Turn::Wanted && !self.stood_in_row
+    }
+
+    pub(super) const fn grant_turn(&mut self) {
+        self.turn = Turn::Granted;
+    }
+
+    pub(super) const fn stand_in_row(&mut self) {
+        self.stood_in_row = true;
     }
 
     pub(super) fn cause(&self) -> Cause {
@@ -112,10 +142,15 @@ impl Supervisor {
             self.start_asked_at = asked_at;
         }
         self.enqueue(now, asker, order, leave, expires);
-        // A poll gives way once; the next waits for its status, or a stream of orders would blind the fleet.
+        self.poll_gives_way() || drops
+    }
+
+    /// Whether the job in flight gives way to an order. A poll does once; the next waits for its status, or a stream of orders would blind
+    /// the fleet.
+    pub(super) fn poll_gives_way(&mut self) -> bool {
         let gives_way = self.in_flight.is_some_and(Job::is_poll) && !self.yielded;
         self.yielded |= gives_way;
-        gives_way || drops
+        gives_way
     }
 
     /// An order that is not even taken on.
@@ -138,7 +173,7 @@ impl Supervisor {
             return ours && self.started_by == Some(id) && self.take_back(now);
         };
         // A motor that runs already goes to the setpoint of a start, before that is sent or without it.
-        let moves = matches!(active.order, Order::Start { .. })
+        let moves = active.is_start()
             && self.lease.is_some()
             && (active.setpoint_given.is_some() || active.is_at_setpoint());
         match active.phase {
@@ -226,9 +261,9 @@ impl Supervisor {
 
     /// Whether a start is being carried out.
     pub(super) fn is_starting(&self) -> bool {
-        self.active.as_ref().is_some_and(|active| {
-            matches!(active.order, Order::Start { .. }) && !matches!(active.phase, Phase::Prepare)
-        })
+        self.active
+            .as_ref()
+            .is_some_and(|active| active.is_start() && !matches!(active.phase, Phase::Prepare))
     }
 
     /// Who waits for the order of which something is sent now, or may be.
@@ -239,10 +274,7 @@ impl Supervisor {
 
     /// How long the calls of the order in flight may wait.
     pub(super) fn order_lifetime(&self, now: Instant) -> Lifetime {
-        let left = |active: &Active| {
-            let is_start = matches!(active.order, Order::Start { .. });
-            active.expiry.left(now, is_start, active.setpoint_given.is_some())
-        };
+        let left = |active: &Active| active.expiry.left(now, active.is_start(), active.has_begun());
         self.active.as_ref().map_or(Expiry::at(now).left(now, false, false), left)
     }
 
@@ -266,6 +298,8 @@ impl Supervisor {
                     setpoint_given: None,
                     armed: false,
                     blocked: None,
+                    turn: Turn::Unwanted,
+                    stood_in_row: false,
                     phase: Phase::Prepare,
                 });
             }
@@ -286,6 +320,7 @@ impl Supervisor {
                 continue;
             }
             match self.allow(now, order, self.active.as_ref()) {
+                Ok(Some(_)) if self.waits_for_turn() => return None,
                 Ok(Some(job)) => {
                     if matches!(job, Job::Start(_)) {
                         self.started_by = self.active.as_ref().and_then(|active| active.asker.id());
@@ -303,10 +338,12 @@ impl Supervisor {
                 }
                 Err(Blocked::For(refused)) => self.end_unsent(now, Outcome::Refused(refused)),
                 Err(Blocked::Until(job, refused)) => {
+                    self.leave_row();
                     self.block(refused, matches!(job, Job::ArmWatchdog(..)));
                     return Some((job, Some(expires)));
                 }
                 Err(Blocked::Meanwhile(refused)) => {
+                    self.leave_row();
                     let stale = refused == Refused::Stale;
                     let first = self.block(refused, false);
                     if stale && first {
@@ -318,12 +355,32 @@ impl Supervisor {
         }
     }
 
+    /// Whether the order is a start whose turn among those of its line has not come; it wants it from now on.
+    fn waits_for_turn(&mut self) -> bool {
+        let Some(active) = self.active.as_mut().filter(|active| active.is_start()) else { return false };
+        if active.turn == Turn::Unwanted {
+            active.turn = Turn::Wanted;
+        }
+        active.turn == Turn::Wanted
+    }
+
+    /// Nobody else of its line waits for what it has to wait for.
+    fn leave_row(&mut self) {
+        if let Some(active) = &mut self.active {
+            active.turn = Turn::Unwanted;
+        }
+    }
+
     fn conclude_order(&mut self, asker: Asker, order: &Order, outcome: Outcome) {
         self.conclude(asker, order.command(), order.start_setpoint(), outcome);
     }
 
     pub(super) fn set_phase(&mut self, phase: Phase) {
         if let Some(active) = &mut self.active {
+            // While something of a start is sent nobody else of its line begins one, and not while its drive is asked what became of it.
+            if let Phase::Verifying { .. } | Phase::Awaiting { .. } = phase {
+                active.turn = Turn::Unwanted;
+            }
             active.phase = phase;
         }
     }

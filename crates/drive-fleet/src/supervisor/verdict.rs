@@ -35,8 +35,7 @@ impl Supervisor {
                 // Where nothing was written, or nothing was done, the drive holds what it held.
                 let holds = error.has_written_nothing() || error.kind() == ErrorKind::Exception;
                 self.given.take_if(|_| !holds);
-                let is_start =
-                    self.active.as_ref().is_some_and(|active| matches!(active.order, Order::Start { .. }));
+                let is_start = self.active.as_ref().is_some_and(Active::is_start);
                 match error.kind() {
                     // What only a start shows, the start shows.
                     ErrorKind::NotConfirmed if is_start && error.only_a_start_shows() => {

@@ -204,7 +204,7 @@ fn a_stop_by_direct_current_is_left_with_its_seconds_and_then_with_the_ramp_that
     rig.drive.run();
     rig.pass(1_000 * MS);
     rig.stop(held);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
     // It brakes: the run command has gone already.
     rig.drive.status.state = State::Stopping;
     rig.drive.status.motion = Motion::Braking;

@@ -278,7 +278,7 @@ fn a_stop_whose_first_attempt_is_under_way_was_sent_once() {
     rig.drive.run();
     rig.pass(1_000 * MS);
     rig.stop(StopMode::Ramp);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(_), .. }));
     let later = rig.now + 2_500 * MS;
     rig.machine.handle_stop_alarm(later);
     let snapshot = rig.machine.snapshot(later);
@@ -313,12 +313,12 @@ fn an_order_that_waited_is_refused_for_what_is_in_its_way_when_its_time_is_over(
     // It waits for a watchdog that is not checked yet; the check comes just too late.
     rig.machine.checks.connected(rig.now);
     rig.machine.checks.handle_identity(rig.now, Ok((rig.drive.identity.clone(), Recognised::CannotTell)));
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Watchdog, .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Watchdog, .. }));
     rig.now += 1_100 * MS;
     let watchdog = rig.drive.watchdog;
     rig.machine.handle_reply(rig.now, Reply::Watchdog(Ok(watchdog)));
     rig.machine.accept_status(rig.now, rig.drive.status.clone());
-    let _ = rig.machine.next(rig.now);
+    let _ = rig.next();
     rig.collect();
     assert_eq!(rig.outcome(id), Some(&Outcome::Expired), "{:?}", rig.outputs);
 }

@@ -326,7 +326,7 @@ fn a_reply_for_which_no_frame_was_sent_does_not_put_off_the_frame_that_feeds_the
 #[test]
 fn a_status_whose_frames_are_answered_is_not_cut_for_a_keep_alive() {
     let mut rig = Rig::ready();
-    while !matches!(rig.machine.next(rig.now), Step::Do { job: Job::Status { .. }, .. }) {
+    while !matches!(rig.next(), Step::Do { job: Job::Status { .. }, .. }) {
         rig.now += 20 * MS;
     }
     let feed_at = rig.machine.checks.feed_at().expect("it has a watchdog");
@@ -638,10 +638,10 @@ fn a_drive_that_cannot_say_which_it_is_is_read_anew_behind_a_lost_line_and_moved
     line_lost(&mut rig);
     let start = rig.order(START);
     rig.drive.log.clear();
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Status { anew: true }, .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Status { anew: true }, .. }));
     let status = rig.drive.answer(Job::Status { anew: true });
     rig.machine.handle_reply(rig.now, status);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Identify, .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Identify, .. }));
     let speechless = Error::Unsupported { what: "identity", reason: "it has none" };
     rig.machine.handle_reply(rig.now, Reply::Identity(Err(speechless)));
     rig.pass(900 * MS);
@@ -664,7 +664,7 @@ fn nothing_is_sent_while_the_drive_behind_a_lost_line_does_not_answer() {
 fn a_start_under_way_when_its_line_is_lost_is_dropped_and_taken_back() {
     let mut rig = Rig::ready();
     let id = rig.order(START);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Start(_), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Start(_), .. }));
     assert!(rig.machine.handle_line_lost(rig.now), "the rest of it is not sent");
     rig.machine.handle_dropped(rig.now);
     rig.pass(900 * MS);
@@ -693,7 +693,7 @@ fn a_stop_goes_on_whatever_answers_behind_a_lost_line() {
     rig.drive.run();
     rig.pass(1_000 * MS);
     let stop = rig.stop(StopMode::Ramp);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(_), .. }));
     assert!(!rig.machine.handle_line_lost(rig.now));
     let reply = rig.drive.answer(Job::Stop(StopMode::Ramp));
     rig.machine.handle_reply(rig.now, reply);

@@ -123,7 +123,7 @@ const ROW_IN_EEPROM: drive_core::Row = drive_core::Row { storage: Storage::Eepro
 /// Goes on until a job of this kind is in flight, and stops the drive then. Until when it might have gone on.
 fn stop_amid(rig: &mut Rig, kind: fn(Job) -> bool) -> Option<Instant> {
     for _ in 0..1_000 {
-        match rig.machine.next(rig.now) {
+        match rig.next() {
             Step::Do { job, until, .. } if kind(job) => {
                 rig.stop(StopMode::Ramp);
                 rig.collect();

@@ -418,7 +418,7 @@ fn first(rig: &mut Rig, asked: Asked, fate: Fate, job: Job) -> Reply {
 fn carried_out(asked: Asked, fate: Fate) -> (Rig, Option<CallId>, usize, bool) {
     let (mut rig, id) = asked.asked();
     let job = loop {
-        match rig.machine.next(rig.now) {
+        match rig.next() {
             Step::Do { job, .. } if asked.is_it(job) => break job,
             Step::Do { job, .. } => {
                 let reply = rig.drive.answer(job);
@@ -538,7 +538,7 @@ fn an_order_that_waited_is_sent_with_what_is_left_of_its_lifetime() {
     rig.order(START);
     rig.now += 300 * MS;
     let lifetime = loop {
-        match rig.machine.next(rig.now) {
+        match rig.next() {
             Step::Do { job: Job::Start(_), lifetime, .. } => break lifetime,
             Step::Do { job, .. } => {
                 let reply = rig.drive.answer(job);

@@ -413,6 +413,8 @@ struct Rig {
     next_call: u64,
     /// Nothing is granted beside statuses, orders and frames for the watchdog.
     others_have_the_turn: bool,
+    /// Another drive of its line starts.
+    others_start: bool,
 }
 
 impl Rig {
@@ -433,6 +435,7 @@ impl Rig {
             outputs: Vec::new(),
             next_call: 0,
             others_have_the_turn: false,
+            others_start: false,
         }
     }
 
@@ -462,6 +465,21 @@ impl Rig {
         self.machine.snapshot(self.now)
     }
 
+    /// What to do now, where the row of those of its line that start was looked at.
+    fn next(&mut self) -> Step {
+        match self.machine.next(self.now) {
+            Step::Wait(_) if self.machine.start_turn() == Turn::Wanted => {
+                if self.others_start {
+                    self.machine.handle_row();
+                } else {
+                    self.machine.grant_start_turn();
+                }
+                self.machine.next(self.now)
+            }
+            step => step,
+        }
+    }
+
     /// Lets the machine work for a time; each job takes 20 ms.
     fn pass(&mut self, time: Duration) {
         let until = self.now + time;
@@ -473,7 +491,7 @@ impl Rig {
                 (self.drive.held, self.drive.lease) = (Some(self.stands), Some(lease));
                 self.machine.handle_lease(self.drive.lease);
             }
-            match self.machine.next(self.now) {
+            match self.next() {
                 Step::Do { job, until, .. } => {
                     assert!(until.is_none_or(|until| until > self.now), "{job:?} would never be done");
                     self.now += 20 * MS;

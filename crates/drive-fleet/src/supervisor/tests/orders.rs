@@ -84,13 +84,13 @@ fn a_setpoint_that_is_being_sent_gives_its_place_to_a_later_one_and_a_stream_of_
     let mut rig = Rig::ready();
     rig.drive.log.clear();
     let first = rig.order(setpoint(31));
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::SetSetpoint(..), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::SetSetpoint(..), .. }));
     // It is on its way, and its answer is lost.
     let asker = rig.asker();
     let second = asker.id().expect("it is a caller's");
     assert!(rig.machine.handle_order(rig.now, asker, setpoint(22), None, None), "the first is dropped");
     rig.machine.handle_dropped(rig.now);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::SetSetpoint(..), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::SetSetpoint(..), .. }));
     let asker = rig.asker();
     let third = asker.id().expect("it is a caller's");
     assert!(!rig.machine.handle_order(rig.now, asker, setpoint(23), None, None), "the second is carried out");
@@ -169,7 +169,7 @@ fn given_behind_forty_hertz(runs: bool, answered_after: Duration) -> (Rig, CallI
     let (asker, expires) = (rig.asker(), Expiry::at(rig.now + 1_000 * MS));
     rig.machine.handle_order(rig.now, asker, run_at(10), None, Some(expires));
     let id = CallId(rig.next_call);
-    let step = rig.machine.next(rig.now);
+    let step = rig.next();
     let Step::Do { job: job @ Job::SetSetpoint(..), .. } = step else { panic!("{step:?}") };
     let reply = rig.drive.answer(job);
     rig.now += answered_after;
@@ -209,13 +209,45 @@ fn a_start_whose_time_is_over_behind_its_setpoint_tells_that_the_drive_has_that_
 
 /// Nobody has said a time: what has begun within the lifetime of the settings has 2 s more, and no longer.
 #[test]
+fn a_start_waits_for_others_of_its_line_and_its_drive_is_polled_meanwhile() {
+    let mut rig = Rig::ready();
+    rig.others_start = true;
+    let start = rig.order(run_at(30));
+    rig.pass(2_900 * MS);
+    assert_eq!((rig.outcome(start), rig.drive.writes()), (None, vec![]));
+    let polled = rig.drive.log.iter().filter(|job| matches!(job, Job::Status { .. })).count();
+    assert!(polled >= 5, "{polled}");
+    rig.others_start = false;
+    rig.pass(200 * MS);
+    assert!(rig.outcome(start).is_some_and(Outcome::is_confirmed));
+}
+
+#[test]
+fn a_start_whose_turn_on_its_line_does_not_come_expires_and_neither_a_setpoint_nor_a_stop_waits_for_one() {
+    let mut rig = Rig::ready();
+    rig.others_start = true;
+    let start = rig.order(run_at(30));
+    rig.pass(3_100 * MS);
+    assert_eq!((rig.outcome(start), rig.drive.writes()), (Some(&Outcome::Expired), vec![]));
+    let setpoint = rig.order(setpoint(20));
+    rig.pass(100 * MS);
+    assert_eq!(rig.outcome(setpoint), Some(&Outcome::Confirmed));
+    let start = rig.order(run_at(30));
+    rig.pass(100 * MS);
+    let stop = rig.stop(StopMode::Ramp);
+    rig.pass(100 * MS);
+    assert_eq!(rig.outcome(start), Some(&Outcome::Refused(Refused::Stopped)));
+    assert!(rig.outcome(stop).is_some_and(Outcome::is_confirmed));
+}
+
+#[test]
 fn a_start_that_has_begun_within_its_lifetime_goes_on_for_two_seconds_more_and_is_never_sent_behind_them() {
     for (answered_after, is_sent) in [(1_500 * MS, true), (2_900 * MS, true), (3_001 * MS, false)] {
         let mut rig = Rig::ready();
         rig.machine.settings.periods.max_age = 10_000 * MS;
         rig.drive.log.clear();
         let id = rig.order(run_at(10));
-        let Step::Do { job: job @ Job::SetSetpoint(..), .. } = rig.machine.next(rig.now) else { panic!() };
+        let Step::Do { job: job @ Job::SetSetpoint(..), .. } = rig.next() else { panic!() };
         let reply = rig.drive.answer(job);
         rig.now += answered_after;
         rig.machine.handle_reply(rig.now, reply);
@@ -406,7 +438,7 @@ fn a_setpoint_that_was_withdrawn_on_its_way_frees_none_of_the_largest_change_per
     rig.machine.settings.limits.change_per_second = Some(Frequency::from_hertz(2));
     let id = rig.order(setpoint(26));
     loop {
-        match rig.machine.next(rig.now) {
+        match rig.next() {
             Step::Do { job: Job::SetSetpoint(..), .. } => break,
             Step::Do { job, .. } => {
                 let reply = rig.drive.answer(job);
@@ -465,7 +497,7 @@ fn an_overloaded_queue_says_so() {
 fn a_start_that_the_family_does_not_confirm_stays_so_whatever_state_the_drive_shows_afterwards() {
     let mut rig = Rig::ready();
     let id = rig.order(START);
-    let step = rig.machine.next(rig.now);
+    let step = rig.next();
     assert!(matches!(step, Step::Do { job: Job::Start(_), .. }), "{step:?}");
     rig.drive.lease = Some(Lease::new(Direction::Forward, 0x000F));
     rig.machine.handle_lease(rig.drive.lease);

@@ -7,13 +7,13 @@ use crate::outcome::StopModes;
 fn a_stop_interrupts_whatever_is_in_flight_and_ends_the_orders() {
     let mut rig = Rig::ready();
     let start = rig.order(START);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Start(_), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Start(_), .. }));
     let waiting = rig.order(Order::Persist);
     let asker = rig.asker();
     assert!(rig.machine.handle_stop(rig.now, asker, StopMode::Ramp.into(), None));
     rig.machine.handle_dropped(rig.now);
     let stop = CallId(rig.next_call);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::Ramp), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(StopMode::Ramp), .. }));
     let reply = rig.drive.answer(Job::Stop(StopMode::Ramp));
     rig.machine.handle_reply(rig.now, reply);
     rig.pass(100 * MS);
@@ -78,7 +78,7 @@ fn a_stop_that_the_drive_takes_back_is_sent_again() {
     rig.drive.log.clear();
     let id = rig.stop(StopMode::Ramp);
     // The drive takes the stop, comes down, and is started by somebody else before it stands.
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(_), .. }));
     let stopping = Status { state: State::Stopping, ..rig.drive.status.clone() };
     rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(Stopped::by(StopMode::Ramp, stopping))));
     assert_eq!(rig.outcome(id), None);
@@ -94,7 +94,7 @@ fn a_ramp_that_hangs_is_an_alarm_after_ten_seconds_and_the_slowest_that_goes_on_
         rig.drive.run();
         rig.pass(1_000 * MS);
         rig.stop(StopMode::Ramp);
-        assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+        assert!(matches!(rig.next(), Step::Do { job: Job::Stop(_), .. }));
         let braking = |centihertz| Status {
             state: State::Stopping,
             motion: Motion::Braking,
@@ -139,7 +139,7 @@ fn whoever_stops_by_injection_ends_it_once_the_motor_is_held_and_not_when_the_ou
         rig.pass(1_000 * MS);
         rig.drive.log.clear();
         let id = rig.stop(StopMode::DcInjection);
-        assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
+        assert!(matches!(rig.next(), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
         let output_frequency = Some(Frequency::ZERO);
         let braking = Status {
             state: State::Stopping,
@@ -166,7 +166,7 @@ fn an_injection_of_which_nobody_knows_when_the_motor_stands_is_ended_before_it_h
     rig.pass(1_000 * MS);
     rig.drive.log.clear();
     rig.stop(StopMode::DcInjection);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
     let braking = Status { state: State::Stopping, motion: Motion::Braking, ..rig.drive.status.clone() };
     let stopped = Stopped::by(StopMode::DcInjection, braking.clone());
     rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(stopped)));
@@ -186,7 +186,7 @@ fn coming_down() -> (Rig, CallId) {
     rig.pass(1_000 * MS);
     rig.outputs.clear();
     let id = rig.stop(StopMode::Ramp);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(_), .. }));
     let braking = Status {
         state: State::Stopping,
         motion: Motion::Braking,
@@ -323,7 +323,7 @@ fn the_alarm_of_a_stop_over_a_cut_cable_says_what_is_not_known_and_how_old_the_l
     rig.drive.failing = Some(PortError::Timeout { after: 100 * MS });
     let id = rig.stop(StopMode::Ramp);
     // The call takes as long as it likes: no error is known yet.
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(_), .. }));
     rig.now = rig.machine.stop_alarm_at().unwrap();
     rig.machine.handle_stop_alarm(rig.now);
     rig.collect();
@@ -349,7 +349,7 @@ fn a_cable_that_is_cut_while_the_motor_comes_down_leaves_its_stop_unknown() {
     rig.drive.run();
     rig.pass(1_000 * MS);
     let id = rig.stop(StopMode::Ramp);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(_), .. }));
     (rig.drive.status.state, rig.drive.status.motion) = (State::Stopping, Motion::Braking);
     let stopping = rig.drive.status.clone();
     rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(Stopped::by(StopMode::Ramp, stopping))));
@@ -468,7 +468,7 @@ fn a_stop_whose_call_takes_long_is_an_alarm_in_its_time() {
     rig.drive.run();
     rig.pass(1_000 * MS);
     let id = rig.stop(StopMode::Ramp);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(_), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(_), .. }));
     let alarm_at = rig.machine.stop_alarm_at().expect("it waits for its confirmation");
     rig.machine.handle_stop_alarm(alarm_at - MS);
     rig.collect();
@@ -516,7 +516,7 @@ fn the_modes_that_were_asked_for_and_used_stand_in_every_outcome_of_a_stop() {
     rig.drive.run();
     rig.pass(1_000 * MS);
     let id = rig.stop(StopMode::DcInjection);
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
     rig.drive.status.motion = Motion::Held;
     let stopped = Stopped::by(StopMode::DcInjection, rig.drive.status.clone());
     rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(stopped)));
@@ -529,7 +529,7 @@ fn the_modes_that_were_asked_for_and_used_stand_in_every_outcome_of_a_stop() {
 fn a_stop_that_never_left_is_not_confirmed_by_a_motor_that_stands_anyway() {
     let mut rig = Rig::ready();
     let id = rig.stop(StopMode::Ramp);
-    let step = rig.machine.next(rig.now);
+    let step = rig.next();
     assert!(matches!(step, Step::Do { job: Job::Stop(StopMode::Ramp), .. }), "{step:?}");
     let unplugged = port_error(PortError::LineDown("unplugged".to_owned()));
     rig.machine.handle_reply(rig.now, Reply::Stopped(Err(unplugged)));
@@ -583,7 +583,7 @@ fn a_second_stop_is_taken_into_the_one_under_way_and_confirmed_by_a_status_that_
     rig.drive.log.clear();
     rig.now += 600 * MS;
     rig.machine.handle_heard(rig.now);
-    let step = rig.machine.next(rig.now);
+    let step = rig.next();
     assert!(matches!(step, Step::Do { job: Job::Status { .. }, .. }), "{step:?}");
     rig.drive.stand();
     let older = read_before(&rig, rig.drive.status.clone());
@@ -629,7 +629,7 @@ fn direct_current_is_held_for_the_time_of_the_call_and_the_outcome_says_what_was
     assert_eq!(rig.machine.injection(), Some(60 * second));
     let again = rig.stop(StopOrder::injecting(2 * second));
     assert_eq!(rig.machine.injection(), Some(60 * second), "the longer brings the motor to rest");
-    assert!(matches!(rig.machine.next(rig.now), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
+    assert!(matches!(rig.next(), Step::Do { job: Job::Stop(StopMode::DcInjection), .. }));
     rig.drive.status.motion = Motion::Held;
     // The driver holds it for as long as a motor bears.
     let stopped = Stopped {

@@ -14,7 +14,7 @@ impl Rig {
 
     /// Begins the next job, and does not answer it.
     fn begins(&mut self) -> Job {
-        let step = self.machine.next(self.now);
+        let step = self.next();
         let Step::Do { job, .. } = step else { panic!("{step:?}") };
         job
     }
@@ -154,7 +154,7 @@ fn a_poll_gives_way_to_one_order_and_the_next_waits_for_its_status() {
     let gives_way = |rig: &mut Rig| {
         rig.pass(10 * MS);
         while !rig.machine.in_flight.is_some_and(Job::is_poll) {
-            match rig.machine.next(rig.now) {
+            match rig.next() {
                 Step::Do { job, .. } if !job.is_poll() => {
                     let reply = rig.drive.answer(job);
                     rig.machine.handle_reply(rig.now, reply);
