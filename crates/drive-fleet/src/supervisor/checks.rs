@@ -37,6 +37,8 @@ pub(crate) struct Checks {
     fixed: Option<Duration>,
     watchdog: WatchdogCheck,
     watchdog_at: Option<Instant>,
+    /// When it was read as the contract says last.
+    verified_at: Option<Instant>,
     /// The watchdog was verified at some time since the program started, so it acts while the drive is lost.
     armed: bool,
     /// As it was read first, before anything was written to it.
@@ -80,6 +82,7 @@ impl Checks {
             fixed: capability.and_then(|watchdog| watchdog.fixed()),
             watchdog,
             watchdog_at: None,
+            verified_at: None,
             armed: false,
             found: None,
             shown: None,

@@ -240,7 +240,12 @@ impl Supervisor {
         }
         let unverified = Refused::WatchdogUnverified;
         match self.checks.watchdog() {
-            check if crate::mutant!("unwatched-moved", check.allows_motion(), true) => Ok(()),
+            check if crate::mutant!("unwatched-moved", check.allows_motion(), true) => {
+                // Whoever only asks whether it would start is told by what was read last.
+                let looks = active.is_some() && status.is_undriven();
+                let again = self.checks.watchdog_again(now).filter(|_| looks);
+                again.map_or(Ok(()), |job| Err(Blocked::Until(job, unverified)))
+            }
             // It is written for an order once.
             WatchdogCheck::WaitsForStandstill(_) if active.is_none_or(|active| !active.armed) => Err(self
                 .checks

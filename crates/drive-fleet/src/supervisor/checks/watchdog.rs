@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use drive_core::{Error, ErrorKind, ExceptionMeaning, Result, Watchdog};
+use drive_core::{Error, ErrorKind, ExceptionMeaning, Ground, Result, Watchdog};
 use tokio::time::Instant;
 
 use super::{AGAIN, Checks};
@@ -16,6 +16,10 @@ use crate::{
 
 /// How often a drive may refuse that its watchdog is set up, a second apart, until that is an alarm.
 const REFUSALS: u8 = 10;
+
+/// For how long one that reads as the contract says counts as so where a motor at rest is to turn: whoever stands at the drive may set it
+/// otherwise, and no word of a motor that stands tells it.
+const HOLDS: Duration = Duration::from_secs(10);
 
 impl Checks {
     pub(crate) const fn watchdog(&self) -> &WatchdogCheck {
@@ -40,6 +44,14 @@ impl Checks {
     pub(crate) fn watchdog_job(&self, now: Instant) -> Option<Job> {
         let due = self.wants_watchdog() && self.watchdog_at.is_some_and(|at| at <= now);
         due.then_some(Job::Watchdog)
+    }
+
+    /// The question whether a watchdog that was verified still is as the contract says, where that was too long ago for a motor at rest that
+    /// is to turn.
+    pub(crate) fn watchdog_again(&self, now: Instant) -> Option<Job> {
+        let holds = |at: Instant| now.saturating_duration_since(at) < HOLDS;
+        let verified = matches!(self.watchdog, WatchdogCheck::Verified(_));
+        (verified && !self.verified_at.is_some_and(holds)).then_some(Job::Watchdog)
     }
 
     /// The job that sets the watchdog up.
@@ -79,6 +91,10 @@ impl Checks {
         }
         match result {
             Ok(watchdog) if self.keeps(watchdog, contract) => {
+                self.verified_at = Some(now);
+                if !written && self.watchdog == WatchdogCheck::Verified(watchdog) {
+                    return None;
+                }
                 self.armed = true;
                 self.written |= written;
                 self.watchdog = WatchdogCheck::Verified(watchdog);
@@ -86,8 +102,10 @@ impl Checks {
                 Some(EventKind::WatchdogVerified { watchdog, written, before })
             }
             Ok(watchdog) if control && self.settable && !written && !self.in_vain => {
-                self.watchdog = WatchdogCheck::WaitsForStandstill(watchdog);
-                None
+                let before =
+                    std::mem::replace(&mut self.watchdog, WatchdogCheck::WaitsForStandstill(watchdog));
+                let changed = matches!(before, WatchdogCheck::Verified(_));
+                changed.then_some(EventKind::ContractChanged(Ground::Watchdog))
             }
             Ok(watchdog) => {
                 self.in_vain |= written;
@@ -99,6 +117,9 @@ impl Checks {
                 self.broken(now, format!("{}; {reason}", describe(watchdog, contract)))
             }
             // A read or a write that found no answer says nothing of the watchdog.
+            Err(Error::Port { .. }) if !written && matches!(self.watchdog, WatchdogCheck::Verified(_)) => {
+                None
+            }
             Err(Error::Port { .. }) => {
                 self.watchdog_at = Some(now + AGAIN);
                 self.watchdog = WatchdogCheck::Unchecked;

@@ -470,6 +470,51 @@ fn a_watchdog_that_is_changed_under_a_contract_is_told_and_nothing_starts_before
 }
 
 #[test]
+fn a_watchdog_that_was_set_otherwise_while_the_motor_stood_is_found_by_a_start_and_set_up_before_it() {
+    let mut rig = Rig::ready();
+    rig.pass(60_000 * MS);
+    rig.drive.log.clear();
+    rig.outputs.clear();
+    rig.drive.watchdog = Watchdog { timeout: None, reaction: None };
+    let start = rig.order(START);
+    rig.pass(1_000 * MS);
+    assert!(rig.outcome(start).is_some_and(Outcome::is_confirmed));
+    let arm = Job::ArmWatchdog(CONTRACT.timeout, CONTRACT.reaction);
+    assert_eq!(rig.drive.writes(), [arm, Job::Start(Direction::Forward)]);
+    assert_eq!(rig.events()[..2], ["contract changed", "watchdog verified"], "{:?}", rig.events());
+    rig.stop(StopMode::Ramp);
+
+    // What nobody has changed is no news, and what was read a moment ago is not read again.
+    rig.pass(60_000 * MS);
+    rig.outputs.clear();
+    for reads in [1, 0] {
+        rig.drive.log.clear();
+        rig.order(START);
+        rig.pass(1_000 * MS);
+        assert_eq!(rig.drive.log.iter().filter(|job| **job == Job::Watchdog).count(), reads);
+        rig.stop(StopMode::Ramp);
+        rig.pass(1_000 * MS);
+    }
+    assert!(!rig.events().contains(&"watchdog verified"), "{:?}", rig.events());
+}
+
+#[test]
+fn a_watchdog_whose_reading_before_a_start_finds_no_answer_once_is_read_again() {
+    let mut rig = Rig::ready();
+    rig.pass(60_000 * MS);
+    rig.drive.log.clear();
+    let start = rig.order(START);
+    let step = rig.next();
+    assert!(matches!(step, Step::Do { job: Job::Watchdog, .. }), "{step:?}");
+    rig.now += 200 * MS;
+    rig.machine
+        .handle_reply(rig.now, Reply::Watchdog(Err(port_error(PortError::Timeout { after: 200 * MS }))));
+    rig.pass(700 * MS);
+    assert!(rig.outcome(start).is_some_and(Outcome::is_confirmed), "{:?}", rig.outcome(start));
+    assert_eq!(rig.drive.log.first(), Some(&Job::Watchdog));
+}
+
+#[test]
 fn a_watchdog_that_is_changed_under_a_motor_that_turns_is_an_alarm() {
     let mut rig = Rig::ready();
     rig.order(START);
