@@ -23,6 +23,8 @@ pub struct Exchange {
     pub request: Box<[u8]>,
     /// What was heard meanwhile: the answer with its check, and whatever came with it, such as an adapter's echo.
     pub answer: Box<[u8]>,
+    /// The longest time from one piece of what was heard to the next, with nothing sent between the two; behind an adapter's echo that is the slave's own.
+    pub pause: Duration,
     /// How it ended.
     pub ending: Ending,
 }
@@ -77,6 +79,9 @@ pub(crate) struct Record {
     exchanges: VecDeque<Exchange>,
     request: Vec<u8>,
     answer: Vec<u8>,
+    /// When the last piece of the answer was heard, and the longest time between two.
+    heard: Option<Instant>,
+    pause: Duration,
 }
 
 impl Record {
@@ -94,11 +99,15 @@ impl Record {
     pub(crate) fn sent(&mut self, bytes: &[u8]) {
         if self.limit > 0 {
             add(&mut self.request, bytes);
+            // What comes next takes the slave's time.
+            self.heard = None;
         }
     }
 
-    pub(crate) fn heard(&mut self, bytes: &[u8]) {
+    pub(crate) fn heard(&mut self, now: Instant, bytes: &[u8]) {
         if self.limit > 0 {
+            let pause = self.heard.replace(now).map(|last| now.saturating_duration_since(last));
+            self.pause = self.pause.max(pause.unwrap_or_default());
             add(&mut self.answer, bytes);
         }
     }
@@ -109,6 +118,8 @@ impl Record {
         }
         let [request, answer]: [Box<[u8]>; 2] =
             [&mut self.request, &mut self.answer].map(|bytes| mem::take(bytes).into());
+        self.heard = None;
+        let pause = mem::take(&mut self.pause);
         if request.is_empty() {
             // It began before anybody asked for them.
             return;
@@ -117,7 +128,7 @@ impl Record {
         if self.exchanges.len() >= self.limit {
             self.exchanges.pop_front();
         }
-        self.exchanges.push_back(Exchange { slave, began, took, request, answer, ending });
+        self.exchanges.push_back(Exchange { slave, began, took, request, answer, pause, ending });
     }
 }
 

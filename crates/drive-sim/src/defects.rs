@@ -11,12 +11,17 @@ use crate::fault::{ALWAYS, PerMillion};
 /// How long bursts of noise that are over are remembered: no frame that may still be looked at is older.
 const REMEMBERED: Duration = Duration::from_secs(2);
 
+/// So many characters of an answer come before the pause of an adapter that makes one inside.
+const FIRST_PIECE: usize = 3;
+
 /// The defects of a line; none by default.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Defects {
     /// The adapter hands over what it has received only every so often, as FTDI's do with their latency timer (16 ms as
     /// delivered): its clock runs on by itself, whoever sends what.
     pub hands_over_every: Option<Duration>,
+    /// The adapter makes a pause of so long inside each answer, behind its third character, as those do that fill packets of their own.
+    pub pauses_inside: Option<Duration>,
     /// The cable of one slave is disturbed while the motor of another runs.
     pub interference: Option<Interference>,
     /// Bursts of noise on the cable.
@@ -117,6 +122,17 @@ impl Defective {
         let (every, since) = (self.defects.hands_over_every?, self.since?);
         let ticks = arrived.saturating_duration_since(since).as_nanos().div_ceil(every.as_nanos().max(1));
         Some(since + every.saturating_mul(u32::try_from(ticks).unwrap_or(u32::MAX)))
+    }
+
+    /// How many characters of an answer are handed over next, of which so many were, and how much later than they arrive, where the adapter
+    /// makes a pause inside.
+    pub(crate) fn next_piece(&self, delivered: usize, whole: usize) -> Option<(usize, Duration)> {
+        let pause = self.defects.pauses_inside?;
+        Some(if delivered < FIRST_PIECE.min(whole) {
+            (FIRST_PIECE.min(whole), Duration::ZERO)
+        } else {
+            (whole, pause)
+        })
     }
 
     /// How the master and all others hear each other.

@@ -179,7 +179,7 @@ impl<C> Master<C> {
         self.fresh.heard(now);
         self.quiet_from = self.quiet_from.max(now);
         if self.flight.is_some() {
-            self.record.heard(bytes);
+            self.record.heard(now, bytes);
         }
         self.evidence.heard(now, Over::First, self.flight.is_some(), bytes);
         let step = self.exchange.handle_bytes(now, bytes);

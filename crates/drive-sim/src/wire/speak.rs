@@ -130,6 +130,10 @@ impl Wire {
                     (first..=whole).take_while(|&upto| self.ends(transmission, upto) <= handed_over);
                 return (index, arrived.last().unwrap_or(whole), handed_over);
             }
+            let pieces = line.defective.next_piece(transmission.delivered, whole);
+            if let Some((upto, later)) = pieces.filter(|_| transmission.kind == Kind::Answer) {
+                return (index, upto, self.ends(transmission, upto) + later);
+            }
             let upto = match self.delivery {
                 Delivery::Whole => whole,
                 Delivery::Pieces(size) => (transmission.delivered + size.max(1)).min(whole),

@@ -86,6 +86,8 @@ pub(super) struct Asked {
     pub(super) ending: Ending,
     /// From the end of the question to the first character of the answer, where there was one.
     pub(super) after: Duration,
+    /// The longest pause inside of it.
+    pub(super) pause: Duration,
     /// The drives whose motors were running, by their last status; `None` before anybody was asked for it.
     pub(super) running: Option<BTreeSet<u8>>,
     /// Intact frames that came before it and that nobody had asked for, since the last question.

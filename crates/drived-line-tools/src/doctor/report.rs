@@ -271,6 +271,7 @@ const fn title(defect: Defect) -> &'static str {
         Defect::NoAnswer => "NO ANSWER FROM A DRIVE",
         Defect::NeedsPause => "THE PAUSE IS TOO SHORT FOR A DRIVE",
         Defect::AdapterHoldsBack => "THE ADAPTER HOLDS ANSWERS BACK",
+        Defect::AnswersInPieces => "ANSWERS COME IN PIECES",
         Defect::LateAnswers => "LATE ANSWERS",
         Defect::SlowDrive => "A SLOW DRIVE",
         Defect::Noise => "NOISE",

@@ -20,6 +20,7 @@ pub(super) enum Defect {
     NoAnswer,
     NeedsPause,
     AdapterHoldsBack,
+    AnswersInPieces,
     LateAnswers,
     SlowDrive,
     Noise,

@@ -86,6 +86,7 @@ pub(super) fn judge(seen: &Observations) -> Vec<Verdict> {
         of_one(found, &mut explained);
     }
     let held = timing::adapter(&case);
+    let held = held.or_else(|| timing::in_pieces(&case, &explained));
     let is_held = held.is_some();
     of_one(held, &mut Vec::new());
     // What else there is shows when the others are silent.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use drive_core::AnswerDelay;
 
-use super::{Case, is_times, share};
+use super::{Case, FEW, is_times, share};
 use crate::doctor::{
     observations::{Asked, Figures},
     verdict::{Certainty, Defect, Verdict},
@@ -128,6 +128,40 @@ pub(super) fn adapter(case: &Case<'_>) -> Option<Verdict> {
             output::bound(tick)
         ),
         &next,
+    ))
+}
+
+/// Answers with a pause inside for which masters do not wait: whoever asks takes what came before it for a damaged one.
+pub(super) fn in_pieces(case: &Case<'_>, explained: &[u8]) -> Option<Verdict> {
+    let usual = case.seen.config.chunk_gap;
+    let is_his = |asked: &&Asked| asked.is_good() && !explained.contains(&asked.slave);
+    let good: Vec<&Asked> = case.seen.asked.iter().filter(is_his).collect();
+    let pauses = || good.iter().map(|asked| asked.pause).filter(|pause| *pause > usual);
+    let (longest, torn) = (pauses().max()?, pauses().count());
+    if torn <= FEW || torn * 50 < good.len() {
+        return None;
+    }
+    let milliseconds = longest.as_millis() / 5 * 5 + 10;
+    let chunk_gap = format!(
+        "say chunk_gap = \"{milliseconds}ms\" of this line in the configuration of drived: it waits so long for the rest of an answer, and a \
+         stop waits for that where one is damaged"
+    );
+    Some(Verdict::new(
+        Defect::AnswersInPieces,
+        &[],
+        Certainty::Certain,
+        format!(
+            "{} of {} answers come with a pause inside, of up to {}: masters wait {} for what follows, and take the beginning for a \
+             damaged answer",
+            torn,
+            good.len(),
+            output::bound(longest),
+            output::bound(usual)
+        ),
+        &[
+            "take another adapter, or set this one, or the program behind which it stands, so that it hands over what it hears at once",
+            &chunk_gap,
+        ],
     ))
 }
 

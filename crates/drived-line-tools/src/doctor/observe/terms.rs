@@ -21,8 +21,8 @@ pub(super) fn of_doctor(task: &Task) -> LineConfig {
         offline_after: 0,
         retries: 0,
         double_window: Duration::ZERO,
-        // An adapter may hold back the rest of an answer for as long as the slowest clock that is looked for.
-        chunk_gap: DITHER,
+        // An adapter may hold back the rest of an answer for as long as the slowest clock that is looked for, or longer.
+        chunk_gap: 2 * DITHER,
         ..task.config.clone()
     };
     task.addresses.iter().fold(config, |config, slave| {
