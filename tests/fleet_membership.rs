@@ -82,7 +82,16 @@ async fn what_does_not_fit_is_refused_and_nothing_is_added() {
     assert!(matches!(add("line 0", 4, "1"), Err(FleetError::NameTaken(_))));
     assert!(matches!(add("line 0", 2, "4"), Err(FleetError::AddressTaken { .. })));
     assert!(matches!(add("line 9", 4, "4"), Err(FleetError::NoSuchLine { .. })));
-    assert_eq!(plant.fleet.drives().len(), 2);
+    let line = plant.lines[0].clone();
+    let twice = plant.fleet.extend(|fleet| {
+        let fleet = fleet.line("the same", line);
+        fleet.drive("the same", 1, DriveSettings::watched("4"), |port, slave| {
+            drives::drive(FAMILY, port, slave)
+        })
+    });
+    let other = "line 0".to_owned();
+    assert_eq!(twice, Err(FleetError::LineTaken { line: "the same".to_owned(), other }));
+    assert_eq!((plant.fleet.drives().len(), plant.fleet.lines().len()), (2, 1));
     let unknown = plant.fleet.reconfigure(DriveSettings::watched("9"));
     assert_eq!(unknown, Err(FleetError::NoSuchDrive("9".to_owned())));
 }

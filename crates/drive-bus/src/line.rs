@@ -143,6 +143,12 @@ impl Line {
         self.slave(0)
     }
 
+    /// Whether both are handles of one line.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.handle, &other.handle)
+    }
+
     /// How the line is configured now.
     #[must_use]
     pub fn config(&self) -> LineConfig {

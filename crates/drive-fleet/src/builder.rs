@@ -127,6 +127,9 @@ impl FleetBuilder {
         let (name, budget) = (name.into(), budget(LineBudget::of(&line.config())));
         if self.by_name.contains_key(&name) {
             self.problem.get_or_insert(FleetError::NameTaken(name.clone()));
+        } else if let Some(other) = self.lines.iter().find(|other| other.line.is_same(&line)) {
+            self.problem
+                .get_or_insert(FleetError::LineTaken { line: name.clone(), other: other.name.clone() });
         } else {
             self.by_name.insert(name.clone(), self.lines.len());
         }

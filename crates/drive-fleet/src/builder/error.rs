@@ -11,6 +11,14 @@ pub enum FleetError {
     /// Two drives or two lines have one name.
     #[error("{0:?}: the name is taken")]
     NameTaken(String),
+    /// A line is there already, under another name: its slaves would be commanded twice.
+    #[error("{line:?} is the line {other:?}")]
+    LineTaken {
+        /// The second name.
+        line: String,
+        /// The first.
+        other: String,
+    },
     /// The fleet has no drive of this name.
     #[error("there is no drive {0:?}")]
     NoSuchDrive(String),
