@@ -1,7 +1,8 @@
 //! The words of the fast set, and what they say.
 
 use drive_core::{
-    Absent, Calls, Class, Current, Frequency, Identity, Port, RawWord, Result, Status, registers::Register,
+    Absent, Calls, Class, Current, Direction, Frequency, Identity, Port, RawWord, Result, Status,
+    registers::Register,
 };
 use drive_drivecom::StatusWords;
 
@@ -68,19 +69,27 @@ impl FastWords {
     /// [`StatusWords::state`].
     pub(crate) fn status(&self, command: Option<ControlWord>) -> Status {
         let state = self.state_words();
+        let own = state.status(command);
         Status {
             output_frequency: self.output(),
+            // The word of the direction is of another exchange than the frequency, and may tell of the rest behind it.
+            direction: if self.is_reversed() { Some(Direction::Reverse) } else { own.direction },
             reference: Some(self.reference()),
             current: self.word(LCR).map(|word| Current::from_deciamperes(u32::from(word))),
             fault_code: self.word(LFT).filter(|&code| state.is_tripped() && code != 0),
             raw: self.raw(),
-            ..state.status(command)
+            ..own
         }
     }
 
     /// The output frequency.
     pub(crate) fn output(&self) -> Option<Frequency> {
         self.word(RFR).map(|word| Frequency::from_decihertz(word.cast_signed().unsigned_abs()))
+    }
+
+    /// Whether the output frequency turns the motor in reverse, by its sign (twin W3202, p. 21). One without a sign tells nothing.
+    fn is_reversed(&self) -> bool {
+        self.word(RFR).is_some_and(|word| word.cast_signed() < 0)
     }
 
     /// The reference before the ramp.
@@ -122,4 +131,29 @@ impl<P: Port> Atv28<P> {
 /// The raw form of the control word, for statuses that were confirmed by it.
 pub(crate) const fn raw_command(value: u16) -> RawWord {
     RawWord { address: CMD.address(), code: CMD.row().code, value }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ETA (p. 21): ready to switch on, and operation enabled in reverse.
+    const AT_REST: u16 = 0x0021;
+    const IN_REVERSE: u16 = 0x8027;
+
+    #[test]
+    fn a_frequency_is_told_with_the_direction_that_it_has_itself() {
+        let status = |rfr: i16, eta: u16| {
+            let mut words = [0; CODES.len()];
+            (words[1], words[8]) = (rfr.cast_unsigned(), eta);
+            let status = FastWords::of(words.map(Some)).status(None);
+            (status.output_frequency, status.direction)
+        };
+        let told = |hertz, direction| (Some(Frequency::from_hertz(hertz)), Some(direction));
+        // It came to rest between the two exchanges.
+        assert_eq!(status(-20, AT_REST), told(2, Direction::Reverse));
+        assert_eq!(status(-20, IN_REVERSE), told(2, Direction::Reverse));
+        assert_eq!(status(20, IN_REVERSE), told(2, Direction::Reverse));
+        assert_eq!(status(0, IN_REVERSE), told(0, Direction::Reverse));
+    }
 }
