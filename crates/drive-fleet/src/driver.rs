@@ -7,7 +7,7 @@ use std::{
 };
 
 use drive_core::{
-    Class, Direction, Drive, Error, Follower, Ground, Lease, Lifetimes, Refusal, Setpoint, later, panic_said,
+    Direction, Drive, Error, Follower, Ground, Lease, Lifetimes, Refusal, Setpoint, later, panic_said,
 };
 use tokio::time::Instant;
 
@@ -110,10 +110,9 @@ impl Driver {
 /// How long what a job asks may wait until it is sent. The time of an order is that order's alone: what looks at a stop is in
 /// the class of commands, too, and waits for as long as it takes.
 fn lifetimes(job: Job, lifetime: Lifetime) -> Lifetimes {
-    let Lifetime { call, all, is_for_a_stop } = lifetime;
-    let polls_as = is_for_a_stop.then_some(Class::Stop);
+    let Lifetime { call, all, asked_as } = lifetime;
     let until = all.map(|all| later(Instant::now(), all));
-    let usual = Lifetimes { polls_as, ..Lifetimes::default() };
+    let usual = Lifetimes { polls_as: asked_as, ..Lifetimes::default() };
     match job {
         Job::Status { .. } => Lifetimes { status: call, ..usual },
         Job::SetSetpoint(..) | Job::Start(_) => Lifetimes { command: call, command_until: until, ..usual },

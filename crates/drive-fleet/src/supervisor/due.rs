@@ -26,7 +26,7 @@ impl Supervisor {
             return Step::Wait(self.wake_at(now));
         };
         let on_turn = urgent.is_none();
-        let lifetime = self.lifetime(now, job);
+        let lifetime = self.lifetime(now, job, on_turn);
         if let Job::Start(_) = job {
             // A new run command takes the place of the one that was to be withdrawn.
             self.withdrawal = None;
@@ -142,13 +142,14 @@ impl Supervisor {
         self.question_job().or_else(|| (self.pace.slow_due() <= now).then_some(Job::Measurements))
     }
 
-    fn lifetime(&self, now: Instant, job: Job) -> Lifetime {
+    fn lifetime(&self, now: Instant, job: Job, on_turn: bool) -> Lifetime {
         match job {
             // Which drive it is decides whether a stop of before is its own: it is looked for as the stop itself would be given.
             Job::Status { .. } if self.owes_stop_of_before() && self.link != Link::Connected => {
                 Lifetime::FOR_A_STOP
             }
             Job::Identify if self.owes_stop_of_before() => Lifetime::FOR_A_STOP,
+            Job::Watchdog if !on_turn => Lifetime::FOR_AN_ORDER,
             Job::Status { .. } => {
                 Lifetime { call: Some(self.pace.until_next(now, self.is_busy())), ..Lifetime::default() }
             }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use drive_core::later;
+use drive_core::{Class, later};
 use tokio::time::Instant;
 
 /// How much longer than its lifetime what a start has to write behind its first word may take, where whoever gave it has said no time: a
@@ -49,13 +49,15 @@ pub(crate) struct Lifetime {
     pub(crate) call: Option<Duration>,
     /// All of its calls together, until the last is.
     pub(crate) all: Option<Duration>,
-    /// A stop waits for what it tells.
-    pub(crate) is_for_a_stop: bool,
+    /// Of what waits for what it tells, where something does.
+    pub(crate) asked_as: Option<Class>,
 }
 
 impl Lifetime {
     /// It waits for as long as a stop does.
-    pub(super) const FOR_A_STOP: Self = Self { call: None, all: None, is_for_a_stop: true };
+    pub(super) const FOR_A_STOP: Self = Self { call: None, all: None, asked_as: Some(Class::Stop) };
+    /// An order waits for what it tells.
+    pub(super) const FOR_AN_ORDER: Self = Self { call: None, all: None, asked_as: Some(Class::Command) };
 
     /// A part of it is over already.
     pub(crate) fn without(self, time: Duration) -> Self {
