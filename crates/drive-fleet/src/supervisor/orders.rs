@@ -312,6 +312,12 @@ impl Supervisor {
                 Phase::Sending(_) | Phase::Verifying { .. } | Phase::Awaiting { .. } => return None,
             }
             let (order, expires) = (active.order, active.expires());
+            // Whatever it has waited for: who ends moves nothing any more.
+            if self.is_exiting() && !active.asker.is_exit() {
+                let gone = self.gone();
+                self.end_unsent(now, Outcome::Refused(gone));
+                continue;
+            }
             if expires <= now {
                 let waited = active.blocked.is_some();
                 // What it has waited for may have come just now, and then something else is in the way, or nothing.

@@ -147,6 +147,13 @@ impl Supervisor {
         }
     }
 
+    /// Whether a stop was asked for that the drive has taken before, so that only a look tells whether it still obeys it: that goes as the
+    /// stop itself would.
+    pub(in crate::supervisor) fn looks_for_a_stop(&self) -> bool {
+        let seen = self.status.as_ref().map(|status| status.at);
+        self.stopping.as_ref().is_some_and(|stopping| stopping.taken && seen < Some(stopping.asked_at))
+    }
+
     /// A caller does not wait any more.
     pub(crate) fn forget_callers(&mut self, gone: impl Fn(CallId) -> bool) {
         if let Some(stopping) = &mut self.stopping {

@@ -241,6 +241,48 @@ fn a_start_whose_turn_on_its_line_does_not_come_expires_and_neither_a_setpoint_n
 }
 
 #[test]
+fn a_start_that_waits_as_its_drive_ends_is_refused_and_never_sent() {
+    type Waits = fn(&mut Rig);
+    let for_its_turn: Waits = |rig| rig.others_start = true;
+    // The last status is older than a command may be, and the next has not come yet.
+    let for_a_status: Waits = |rig| {
+        rig.drive.failing = Some(PortError::Timeout { after: 500 * MS });
+        rig.pass(3_500 * MS);
+    };
+    for (waits, policy) in [for_its_turn, for_a_status]
+        .into_iter()
+        .flat_map(|waits| [Policy::Exit, Policy::Removal].map(|policy| (waits, policy)))
+    {
+        let mut rig = Rig::ready();
+        waits(&mut rig);
+        let start = rig.order(run_at(30));
+        rig.pass(100 * MS);
+        rig.machine.handle_exit(rig.now, policy);
+        rig.others_start = false;
+        rig.drive.failing = None;
+        rig.pass(3_000 * MS);
+        assert!(matches!(rig.outcome(start), Some(Outcome::Refused(_))), "{:?}", rig.outcome(start));
+        let moves = |job: &Job| matches!(job, Job::Start(_) | Job::SetSetpoint(..));
+        assert!(!rig.drive.log.iter().any(moves), "{:?}", rig.drive.log);
+    }
+}
+
+#[test]
+fn a_start_whose_setpoint_is_sent_as_its_drive_is_left_gets_no_run_word() {
+    let on_exit = OnExit::Leave;
+    let mut rig = Rig::new(DriveSettings { on_exit, ..settings() });
+    rig.pass(1_500 * MS);
+    let start = rig.order(run_at(30));
+    let step = rig.next();
+    assert!(matches!(step, Step::Do { job: Job::SetSetpoint(..), .. }), "{step:?}");
+    rig.machine.handle_exit(rig.now, Policy::Exit);
+    rig.machine.handle_reply(rig.now, Reply::Setpoint(Ok(())));
+    rig.pass(1_000 * MS);
+    assert!(rig.outcome(start).is_some_and(|outcome| !outcome.is_confirmed()), "{:?}", rig.outcome(start));
+    assert!(!rig.drive.log.iter().any(|job| matches!(job, Job::Start(_))), "{:?}", rig.drive.log);
+}
+
+#[test]
 fn a_start_that_has_begun_within_its_lifetime_goes_on_for_two_seconds_more_and_is_never_sent_behind_them() {
     for (answered_after, is_sent) in [(1_500 * MS, true), (2_900 * MS, true), (3_001 * MS, false)] {
         let mut rig = Rig::ready();
