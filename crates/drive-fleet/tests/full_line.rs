@@ -11,7 +11,7 @@ use drive_fleet::{
 };
 use drive_sim::{SimLine, SimSlave, Wiring, models::atv312};
 use futures_util::{FutureExt, future::join_all};
-use tokio::time::Instant;
+use tokio::time::{Instant, sleep};
 
 const SECOND: Duration = Duration::from_secs(1);
 /// As many as one line of RS-485 has.
@@ -72,6 +72,25 @@ async fn of_five_that_are_started_at_once_on_a_full_line_the_first_start_and_no_
 async fn of_all_that_are_started_at_once_on_a_full_line_as_many_start_as_it_has_time_for() {
     let started = start_at_once(31, |fan, start| fan.order_since(start, Instant::now(), 5 * SECOND)).await;
     assert!(started >= 3, "{started}");
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_waits_to_start_as_the_fleet_ends_is_never_started_and_what_runs_is_stopped() {
+    let (fleet, fans, machines, _site) = full_line().await;
+    let started = fans[8].run(Direction::Forward, Frequency::from_hertz(45)).await;
+    assert!(started.is_confirmed(), "{started}");
+    let setpoint = Some(Frequency::from_hertz(25).into());
+    let start = Order::Start { direction: Direction::Forward, setpoint, until: Until::InForce };
+    let starts = fans[..5].iter().map(async |fan| fan.order_since(start, Instant::now(), 9 * SECOND).await);
+    let ends = async {
+        sleep(Duration::from_millis(400)).await;
+        fleet.shutdown(60 * SECOND).await
+    };
+    let (outcomes, ended) = tokio::join!(join_all(starts), ends);
+    assert!(!outcomes.iter().any(Outcome::is_confirmed), "{outcomes:?}");
+    assert!(machines.iter().all(|machine| !machine.observe().running), "{outcomes:?} {ended:?}");
+    sleep(10 * SECOND).await;
+    assert!(machines.iter().all(|machine| !machine.observe().running));
 }
 
 /// `CMD`, the control word (BBV51701 p. 14), of the request that writes one register.
