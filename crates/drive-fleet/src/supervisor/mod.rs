@@ -56,7 +56,7 @@ use crate::{
     event::EventKind,
     exceeded::Limit,
     limits::Given,
-    outcome::{Outcome, Unknown},
+    outcome::{Order, Outcome, Unknown},
     settings::DriveSettings,
     snapshot::{Counters, Link, Timed, Trip},
 };
@@ -100,6 +100,8 @@ pub(crate) struct Supervisor {
     start_asked_at: Option<Instant>,
     /// The setpoint before the one that is sent was dropped for it.
     setpoint_dropped: bool,
+    /// That setpoint, until something later is sent, or is not: only then it is known what to tell of it.
+    dropped_for_later: Option<(Asker, Order)>,
     withdrawal: Option<Withdrawal>,
     exit: Exit,
     /// Why it ends.
@@ -188,6 +190,7 @@ impl Supervisor {
             setpoint_asked_at: None,
             start_asked_at: None,
             setpoint_dropped: false,
+            dropped_for_later: None,
             withdrawal: None,
             exit: Exit::No,
             exits_by: Policy::Exit,

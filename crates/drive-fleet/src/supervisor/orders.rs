@@ -225,12 +225,21 @@ impl Supervisor {
         let Some(active) = replaced else { return false };
         let is_sent = matches!(active.phase, Phase::Sending(_));
         if is_sent {
-            // It may stand in the drive or not.
+            // It may stand in the drive or not, and does so if the latest is never sent.
             (self.given, self.setpoint_dropped) = (None, true);
+            self.dropped_for_later = Some((active.asker, active.order));
+            return true;
         }
         let outcome = active.ended_by(Refused::Superseded, Unconfirmed::Superseded);
         self.conclude_order(active.asker, &active.order, outcome);
-        is_sent
+        false
+    }
+
+    /// What became of a setpoint that has given its place while it was being sent: something later was sent, or never will be.
+    fn conclude_dropped(&mut self, outcome: Outcome) {
+        if let Some((asker, order)) = self.dropped_for_later.take() {
+            self.conclude_order(asker, &order, outcome);
+        }
     }
 
     pub(super) fn enqueue(
@@ -289,6 +298,10 @@ impl Supervisor {
                 self.conclude_order(active.asker, &active.order, outcome);
             }
             if self.active.is_none() {
+                if self.queue.is_empty() && self.dropped_for_later.is_some() {
+                    let unknown = self.unknown(now, self.last_error.clone());
+                    self.conclude_dropped(unknown);
+                }
                 let Queued { asker, order, before, expires } = self.queue.pop_front()?;
                 self.active = Some(Active {
                     asker,
@@ -334,6 +347,7 @@ impl Supervisor {
                         self.withdrawal = None;
                     }
                     self.set_phase(Phase::Sending(job));
+                    self.conclude_dropped(Outcome::NotConfirmed(Unconfirmed::Superseded));
                     return Some((job, None));
                 }
                 Ok(None) => {

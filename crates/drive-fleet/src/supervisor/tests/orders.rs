@@ -103,6 +103,23 @@ fn a_setpoint_that_is_being_sent_gives_its_place_to_a_later_one_and_a_stream_of_
     assert_eq!(rig.snapshot().setpoint, Some(Frequency::from_hertz(23).into()));
 }
 
+#[test]
+fn a_setpoint_that_gave_its_place_to_one_that_is_never_sent_is_not_told_as_superseded() {
+    let mut rig = Rig::ready();
+    let first = rig.order(setpoint(31));
+    assert!(matches!(rig.next(), Step::Do { job: Job::SetSetpoint(..), .. }));
+    let asker = rig.asker();
+    let second = asker.id().expect("it is a caller's");
+    let soon = Some(Expiry::at(rig.now + 10 * MS));
+    assert!(rig.machine.handle_order(rig.now, asker, setpoint(22), None, soon), "the first is dropped");
+    rig.machine.handle_dropped(rig.now);
+    assert_eq!(rig.outcome(first), None);
+    rig.now += 20 * MS;
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(second), Some(&Outcome::Expired));
+    assert!(matches!(rig.outcome(first), Some(Outcome::OutcomeUnknown(_))), "{:?}", rig.outcome(first));
+}
+
 /// What is shown as its setpoint is what it is started at, whoever has written the reference since; a group has just given it.
 #[test]
 fn a_start_without_a_setpoint_gives_the_one_that_is_shown_anew_and_that_of_a_group_once() {
