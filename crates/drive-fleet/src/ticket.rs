@@ -103,6 +103,12 @@ impl Ticket {
         *self.heard.get_mut() = false;
     }
 
+    /// Whether something of it was sent to the drive, or may have been.
+    #[must_use]
+    pub fn has_begun(&self) -> bool {
+        self.hearer.as_ref().is_some_and(|hearer| hearer.borrow().begun)
+    }
+
     async fn hear(&self, early: bool) -> Outcome {
         let outcome = self.unheard(early).await;
         self.keep();

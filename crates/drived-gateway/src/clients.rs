@@ -4,14 +4,11 @@
 use std::{
     collections::HashMap,
     net::IpAddr,
-    sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 use drive_fleet::Place;
-use tokio::time::Instant;
+use tokio::{sync::watch, time::Instant};
 
 /// How many addresses are remembered. Who comes back after having been forgotten has to write a word without run again.
 const KEPT: usize = 1_024;
@@ -40,18 +37,23 @@ pub(super) enum Before {
 pub(super) struct Connection {
     pub(super) peer: IpAddr,
     opened: Moment,
-    closed: AtomicBool,
+    closed: watch::Sender<bool>,
 }
 
 impl Connection {
     /// Its client has closed his side.
     pub(super) fn close(&self) {
-        self.closed.store(true, Ordering::Relaxed);
+        self.closed.send_replace(true);
     }
 
     /// Whether its client may still hear what is answered.
     pub(super) fn is_open(&self) -> bool {
-        !self.closed.load(Ordering::Relaxed)
+        !*self.closed.borrow()
+    }
+
+    /// Where it is told that he has, or that nobody serves him any more.
+    pub(super) fn gone(&self) -> watch::Receiver<bool> {
+        self.closed.subscribe()
     }
 }
 
@@ -97,7 +99,7 @@ impl Clients {
 
     /// A client has opened a connection.
     pub(super) fn open(&self, peer: IpAddr) -> Connection {
-        Connection { peer, opened: lock(&self.course.0).next(), closed: AtomicBool::new(false) }
+        Connection { peer, opened: lock(&self.course.0).next(), closed: watch::Sender::new(false) }
     }
 
     /// A client has asked for something.

@@ -405,6 +405,35 @@ async fn a_start_that_waits_in_its_queue_is_not_begun_after_a_stop_of_another_fa
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_start_that_waits_for_others_of_its_line_is_not_begun_for_a_client_that_is_gone() {
+    for leaves in [false, true] {
+        let (plant, desk) = operated(4, |_| {}).await;
+        let mut peer = Peer::of(&desk);
+        climb(&mut peer, 4).await;
+        assert_eq!(peer.ask(4, &write(LFR, 300)).await, write(LFR, 300));
+        let (caller, _) = stop_of_all(Instant::now());
+        for drive in &plant.plant.fleet().drives()[..2] {
+            let target = Target::Drive(drive.name().to_string());
+            let setpoint = Some(Frequency::from_hertz(20).into());
+            let action =
+                Action::Start { direction: Direction::Forward, setpoint, until: drive_fleet::Until::InForce };
+            let arrived = Instant::now();
+            let request = Request { id: None, target, action, expects: None, lifetime: LIFETIME, arrived };
+            plant.plant.begin(&caller, request).unwrap();
+        }
+        peer.send(4, &write(CMD, 0x000F)).await;
+        sleep(Duration::from_millis(300)).await;
+        assert!(plant.machines.iter().all(|machine| !machine.observe().running), "all wait or are begun");
+        if leaves {
+            drop(peer);
+        }
+        sleep(Duration::from_secs(10)).await;
+        let running = plant.machines.iter().map(|machine| machine.observe().running);
+        assert_eq!(running.collect::<Vec<_>>(), [true, true, false, !leaves]);
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn unit_0_stops_all_where_allowed_and_nothing_else() {
     let (plant, desk) = operated(2, |config| config.broadcast = true).await;
     let mut peer = Peer::of(&desk);

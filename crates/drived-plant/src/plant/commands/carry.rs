@@ -12,11 +12,11 @@ use std::{
 
 use drive_fleet::{
     Act, DriveHandle, Fleet, Group, GroupFailure, GroupStart, GroupStop, GroupTicket, Link, Order, Outcome,
-    StopReport, StopTicket, Ticket, view::StopModesView,
+    Refused, StopReport, StopTicket, Ticket, view::StopModesView,
 };
 use futures_util::future::join_all;
 use tokio::{
-    sync::Notify,
+    sync::{Notify, watch},
     time::{Instant, sleep, timeout_at},
 };
 
@@ -206,17 +206,17 @@ impl Work {
 
     /// Begins, and goes on whether or not anybody waits. What is asked of the drives is on its way to them when this
     /// returns, whatever the caller's task has still to spend; only a start of several waits for its turn. A stop is under way.
-    pub(super) fn begin(self, command: Command, stops: Option<Posted>) {
+    pub(super) fn begin(self, command: Command, stops: Option<Posted>, gone: Option<watch::Receiver<bool>>) {
         let posted = stops.unwrap_or_else(|| self.post());
         let first = Arc::clone(&command.borrow());
         self.0.plant.0.tell_command(&first, None);
         let runtime = self.0.plant.0.runtime.clone();
-        runtime.spawn(self.carried(posted, command));
+        runtime.spawn(self.carried(posted, command, gone));
     }
 
-    pub(super) async fn carried(self, posted: Posted, command: Command) {
+    pub(super) async fn carried(self, posted: Posted, command: Command, gone: Option<watch::Receiver<bool>>) {
         tokio::select! {
-            () = self.work(posted) => {}
+            () = self.work(posted, gone.as_ref()) => {}
             () = self.tell_changes(&command) => {}
         }
         self.tell(&command);
@@ -271,7 +271,7 @@ impl Work {
         }
     }
 
-    async fn work(&self, posted: Posted) {
+    async fn work(&self, posted: Posted, gone: Option<&watch::Receiver<bool>>) {
         match posted {
             Posted::Stop(stop) => self.stopped(0, &stop).await,
             Posted::StopOfSeveral(stops) => {
@@ -285,8 +285,16 @@ impl Work {
                 }
             }
             Posted::Orders(orders) => {
-                let orders = orders.iter().enumerate();
-                join_all(orders.map(async |(number, order)| self.end(number, &order.finished().await))).await;
+                let orders = orders.into_iter().enumerate();
+                join_all(orders.map(async |(number, order)| {
+                    let outcome = tokio::select! {
+                        biased;
+                        outcome = order.finished() => outcome,
+                        () = left(gone) => heard_by_nobody(order).await,
+                    };
+                    self.end(number, &outcome);
+                }))
+                .await;
             }
             Posted::Nothing => {
                 let Inner { plant, request, .. } = &*self.0;
@@ -448,6 +456,24 @@ impl CommandView {
         let text = (!text.is_empty()).then(|| text.join("; "));
         Self { outcome, open, reason: reason.map(Cow::from), text, status, took_ms, ..self }
     }
+}
+
+/// Until whoever has asked is gone, and for ever where nobody knows.
+async fn left(gone: Option<&watch::Receiver<bool>>) {
+    match gone {
+        // Who serves him no more says so by having ended.
+        Some(gone) => drop(gone.clone().wait_for(|is_gone| *is_gone).await),
+        None => std::future::pending().await,
+    }
+}
+
+/// What becomes of an order whose asker is gone: it goes on where it has begun, and else it never does.
+async fn heard_by_nobody(order: Ticket) -> Outcome {
+    if order.has_begun() {
+        return order.finished().await;
+    }
+    order.withdraw();
+    Outcome::Refused(Refused::Withdrawn)
 }
 
 /// What a drive is asked for an action; `None` for a stop, which is no order.

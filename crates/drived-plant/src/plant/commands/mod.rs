@@ -23,6 +23,7 @@ use drive_fleet::{DriveHandle, Place, ShownIdentity, StopOrder, Until};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::{
+    sync::watch,
     task::yield_now,
     time::{Instant, timeout},
 };
@@ -230,7 +231,7 @@ impl Plant {
         wait: Duration,
     ) -> Result<Arc<CommandView>, Rejected> {
         let asked_after = request.arrived;
-        self.command_asked_after(caller, request, asked_after, wait).await
+        self.command_asked_after(caller, request, asked_after, None, wait).await
     }
 
     /// The same, begun by [`begin_asked_after`](Self::begin_asked_after).
@@ -242,9 +243,10 @@ impl Plant {
         caller: &Caller,
         request: Request,
         asked_after: Instant,
+        gone: Option<watch::Receiver<bool>>,
         wait: Duration,
     ) -> Result<Arc<CommandView>, Rejected> {
-        let told = self.begin_asked_after(caller, request, asked_after)?;
+        let told = self.begin_asked_after(caller, request, asked_after, gone)?;
         Ok(settled(told, wait).await)
     }
 
@@ -261,11 +263,12 @@ impl Plant {
     /// [`Rejected`]: nothing was done.
     pub fn begin(&self, caller: &Caller, request: Request) -> Result<Told, Rejected> {
         let asked_after = request.arrived;
-        self.begin_asked_after(caller, request, asked_after)
+        self.begin_asked_after(caller, request, asked_after, None)
     }
 
     /// The same with what may have been on its way since `asked_after`, such as over a broker: a stop by another door since then may have
-    /// come after it, and it is not begun. What came through the same door came in its order.
+    /// come after it, and it is not begun. What came through the same door came in its order. What a drive is asked and nothing
+    /// of which has begun is withdrawn, if it is no stop, once whoever has asked is `gone`.
     ///
     /// # Errors
     /// [`Rejected`]: nothing was done.
@@ -274,6 +277,7 @@ impl Plant {
         caller: &Caller,
         mut request: Request,
         asked_after: Instant,
+        gone: Option<watch::Receiver<bool>>,
     ) -> Result<Told, Rejected> {
         let (has_right, right) = match request.action {
             Action::Stop(_) => (caller.rights.stop, "stop"),
@@ -325,7 +329,7 @@ impl Plant {
             Found::Again(told) => Ok(told.subscribe()),
             Found::New(command) => {
                 let told = command.subscribe();
-                work.begin(command, None);
+                work.begin(command, None, gone);
                 Ok(told)
             }
         }
@@ -352,13 +356,13 @@ impl Plant {
             self.0.commands.find_or_add(caller, asked, first)?;
         let told = command.subscribe();
         match work {
-            Some(work) => work.begin(command, Some(stops)),
+            Some(work) => work.begin(command, Some(stops), None),
             None => {
                 let (plant, caller) = (self.clone(), caller.clone());
                 self.0.runtime.spawn(async move {
                     let work = Work::new(plant, &caller, &request, meant);
                     work.tell(&command);
-                    work.carried(stops, command).await;
+                    work.carried(stops, command, None).await;
                 });
             }
         }
