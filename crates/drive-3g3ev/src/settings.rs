@@ -100,9 +100,8 @@ impl<P: Port> Drive3g3ev<P> {
 
     /// Refuses what rests on the unit, where n39 was changed.
     pub(crate) fn check_unit(&self, command: Command) -> Result<()> {
-        const CHANGED: Refusal = Refusal::Settings(
-            "n39 was changed and acts at the next power-up: switch the drive off and on, then forget() reads it again",
-        );
+        const CHANGED: Refusal =
+            Refusal::Settings("n39 was changed and acts at the next power-up: switch the drive off and on");
         if self.settings.unit_changed { Err(self.refused(command, CHANGED)) } else { Ok(()) }
     }
 

@@ -23,7 +23,8 @@ pub struct Exchange {
     pub request: Box<[u8]>,
     /// What was heard meanwhile: the answer with its check, and whatever came with it, such as an adapter's echo.
     pub answer: Box<[u8]>,
-    /// The longest time from one piece of what was heard to the next, with nothing sent between the two; behind an adapter's echo that is the slave's own.
+    /// The longest time from one piece of what was heard to the next, with nothing sent between the two. From an adapter's echo to the answer
+    /// is none: that is the slave's.
     pub pause: Duration,
     /// How it ended.
     pub ending: Ending,
@@ -106,8 +107,11 @@ impl Record {
 
     pub(crate) fn heard(&mut self, now: Instant, bytes: &[u8]) {
         if self.limit > 0 {
-            let pause = self.heard.replace(now).map(|last| now.saturating_duration_since(last));
-            self.pause = self.pause.max(pause.unwrap_or_default());
+            let last = self.heard.replace(now);
+            // Behind an adapter's echo the slave has its time.
+            if let Some(last) = last.filter(|_| self.answer != self.request) {
+                self.pause = self.pause.max(now.saturating_duration_since(last));
+            }
             add(&mut self.answer, bytes);
         }
     }

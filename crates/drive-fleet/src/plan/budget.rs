@@ -15,6 +15,9 @@ const ANSWER: usize = 2;
 /// Bytes of the answer to a frame for a watchdog: a word that is read, or what a loop-back has carried.
 const FED: usize = 5;
 
+/// Milliseconds of the longest pause that adapters usually make inside an answer: as long as a line allows for that nothing is said of.
+const USUAL_PAUSE: u128 = 20;
+
 /// What a line gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -29,6 +32,9 @@ pub struct LineBudget {
         serde(rename = "response_ns", with = "drive_core::serialize::duration_ns")
     )]
     pub response: Duration,
+    /// What an adapter's pauses inside answers add to each, where the configuration says that it makes longer ones than adapters usually do.
+    #[cfg_attr(feature = "serde", serde(rename = "pause_ns", with = "drive_core::serialize::duration_ns"))]
+    pub pause: Duration,
     /// How long the line waits for an answer that does not come.
     #[cfg_attr(
         feature = "serde",
@@ -61,6 +67,7 @@ impl LineBudget {
             serial: if config.protocol.is_paced() { Some(config.serial) } else { None },
             protocol: config.protocol,
             response: Duration::from_millis(10),
+            pause: if config.chunk_gap.as_millis() > USUAL_PAUSE { config.chunk_gap } else { Duration::ZERO },
             response_timeout: config.response_timeout,
             broadcast_turnaround: config.broadcast_pause,
             slave_change_gap: config.slave_change_gap,
@@ -94,7 +101,7 @@ impl LineBudget {
     fn slot(&self, answer: usize) -> Duration {
         self.serial.map_or(self.response, |serial| {
             let wire = self.protocol.exchange_time(serial, REQUEST, answer);
-            wire + self.response * self.protocol.turns() + self.slave_change_gap
+            wire + (self.response + self.pause) * self.protocol.turns() + self.slave_change_gap
         })
     }
 

@@ -19,6 +19,15 @@ fn budget() -> LineBudget {
     LineBudget::of(&LineConfig::stream(SerialSettings::MODBUS_DEFAULT))
 }
 
+#[test]
+fn an_adapter_that_is_said_to_make_longer_pauses_than_usual_makes_each_answer_so_much_later() {
+    let of = |chunk_gap| {
+        LineBudget::of(&LineConfig { chunk_gap, ..LineConfig::stream(SerialSettings::MODBUS_DEFAULT) })
+    };
+    assert_eq!(of(20 * MS), of(5 * MS));
+    assert_eq!(of(60 * MS).read_slot(), of(20 * MS).read_slot() + 60 * MS);
+}
+
 fn drives(number: usize, running: Duration, watchdog: Option<Duration>) -> Vec<Demand> {
     let watchdog = watchdog.map(|timeout| WatchdogContract { timeout, reaction: Reaction::Ramp });
     let periods =

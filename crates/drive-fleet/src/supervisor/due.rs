@@ -149,7 +149,6 @@ impl Supervisor {
                 Lifetime::FOR_A_STOP
             }
             Job::Identify if self.owes_stop_of_before() => Lifetime::FOR_A_STOP,
-            Job::Status { .. } if self.looks_for_a_stop() => Lifetime::FOR_A_STOP,
             Job::Watchdog if !on_turn => Lifetime::FOR_AN_ORDER,
             Job::Status { .. } => {
                 Lifetime { call: Some(self.pace.until_next(now, self.is_busy())), ..Lifetime::default() }

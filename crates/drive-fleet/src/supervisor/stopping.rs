@@ -102,7 +102,8 @@ impl Stopping {
             mode: self.used,
             since: self.since,
             attempts: self.begun,
-            taken: self.taken,
+            // What is asked for again has yet to be taken.
+            taken: self.taken && self.next_try.is_none(),
             alarm: self.alarm_at.is_none(),
             undone: self.undone,
         }

@@ -405,6 +405,22 @@ async fn a_start_that_waits_in_its_queue_is_not_begun_after_a_stop_of_another_fa
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_stop_behind_one_that_another_master_has_undone_is_confirmed_by_what_the_drive_shows_since() {
+    let (plant, desk) = operated(1, |_| {}).await;
+    let machine = &plant.machines[0];
+    let mut peer = Peer::of(&desk);
+    climb(&mut peer, 1).await;
+    assert_eq!(peer.ask(1, &write(LFR, 300)).await, write(LFR, 300));
+    assert_eq!(peer.ask(1, &write(CMD, 0x000F)).await, write(CMD, 0x000F));
+    sleep(Duration::from_secs(10)).await;
+    // Along its ramp (p. 16), which is undone while the motor comes down.
+    assert_eq!(peer.ask(1, &write(CMD, 0x100F)).await, write(CMD, 0x100F));
+    machine.written_by_another(CMD, 0x000F).unwrap();
+    assert_eq!(peer.ask(1, &write(CMD, 0x100F)).await, write(CMD, 0x100F));
+    assert_eq!(machine.peek(CMD), Some(0x100F), "its answer is not that of the first");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_start_that_waits_for_others_of_its_line_is_not_begun_for_a_client_that_is_gone() {
     for leaves in [false, true] {
         let (plant, desk) = operated(4, |_| {}).await;

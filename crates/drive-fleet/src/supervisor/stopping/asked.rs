@@ -38,7 +38,8 @@ impl Supervisor {
     pub(in crate::supervisor) fn drops_for_stop(&self) -> bool {
         match (self.in_flight, &self.stopping) {
             (Some(Job::Stop(mode)), Some(stopping)) => stopping.mode != mode,
-            (Some(_), Some(stopping)) => !stopping.taken,
+            (Some(Job::Status { .. }), Some(stopping)) => !stopping.taken,
+            (Some(_), Some(stopping)) => !stopping.taken || stopping.next_try.is_some(),
             _ => false,
         }
     }
@@ -106,8 +107,9 @@ impl Supervisor {
                 // The longer brings the motor to rest.
                 stopping.injection = stopping.injection.max(injection);
                 if stopping.taken {
-                    // It comes down already, and the next status says of this one, too, how far it is.
+                    // It comes down already, or was seen to: somebody else may have run it since, which shows late or not at all.
                     waiter.until = waiter.until.max(now + self.settings.times.standstill);
+                    stopping.next_try = Some(now);
                     self.pace.hurry(now);
                 } else {
                     stopping.next_try = Some(now);
@@ -145,13 +147,6 @@ impl Supervisor {
                 });
             }
         }
-    }
-
-    /// Whether a stop was asked for that the drive has taken before, so that only a look tells whether it still obeys it: that goes as the
-    /// stop itself would.
-    pub(in crate::supervisor) fn looks_for_a_stop(&self) -> bool {
-        let seen = self.status.as_ref().map(|status| status.at);
-        self.stopping.as_ref().is_some_and(|stopping| stopping.taken && seen < Some(stopping.asked_at))
     }
 
     /// A caller does not wait any more.

@@ -25,6 +25,10 @@ impl Supervisor {
             return;
         }
         stopping.see_again(now, &status.value, standstill);
+        if stopping.taken && status.value.is_undriven() {
+            // Who has asked again while it came down needs no word any more.
+            stopping.next_try = None;
+        }
         let injects = stopping.used == StopMode::DcInjection;
         let injected_for = stopping.injects_since.map(|since| now.saturating_duration_since(since));
         match motion {
@@ -50,7 +54,9 @@ impl Supervisor {
                 if !(is_known || is_another && stopping.of_another) {
                     return;
                 }
-                self.tell_taken(at);
+                if stopping.next_try.is_none() {
+                    self.tell_taken(at);
+                }
                 // Without an output no more is to be had: the shaft may coast.
                 let ends = matches!(motion, Motion::Held | Motion::AtRest | Motion::Coasting);
                 if crate::mutant!("braking-told-as-standstill", ends, true) {

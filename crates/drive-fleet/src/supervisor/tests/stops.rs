@@ -649,23 +649,16 @@ fn direct_current_is_held_for_the_time_of_the_call_and_the_outcome_says_what_was
 }
 
 #[test]
-fn a_stop_that_is_asked_for_again_while_the_motor_comes_down_by_one_is_looked_after_as_a_stop() {
-    let mut rig = Rig::running_at(30);
-    rig.drive.ramps = true;
-    rig.stop(StopMode::Ramp);
-    rig.pass(400 * MS);
-    assert!(rig.snapshot().stop.is_some_and(|stop| stop.taken));
-    let look = |step: Step| match step {
-        Step::Do { job: Job::Status { .. }, lifetime, .. } => lifetime.asked_as,
-        step => panic!("{step:?}"),
-    };
-    rig.stop(StopMode::Ramp);
-    let step = rig.next();
-    assert_eq!(look(step), Some(drive_core::Class::Stop));
-    // What was seen since is as good as any.
-    rig.machine.handle_dropped(rig.now);
-    rig.pass(40 * MS);
-    rig.now += 500 * MS;
-    let step = rig.next();
-    assert_eq!(look(step), None);
+fn a_stop_that_is_asked_for_again_while_the_motor_comes_down_by_one_is_written_again_at_once() {
+    let (mut rig, _) = coming_down();
+    for (asked, drops) in [(Job::Measurements, true), (Job::Status { anew: false }, false)] {
+        rig.machine.in_flight = Some(asked);
+        let asker = rig.asker();
+        assert_eq!(rig.machine.handle_stop(rig.now, asker, StopMode::Ramp.into(), None), drops, "{asked:?}");
+        rig.machine.in_flight = None;
+        let step = rig.next();
+        assert!(matches!(step, Step::Do { job: Job::Stop(StopMode::Ramp), .. }), "{step:?}");
+        let braking = rig.drive.status.clone();
+        rig.machine.handle_reply(rig.now, Reply::Stopped(Ok(Stopped::by(StopMode::Ramp, braking))));
+    }
 }

@@ -2,7 +2,7 @@
 
 use drive_core::{Drive, Intent, StopMode};
 use drive_families::Family;
-use drive_fleet::{DriveHandle, Until};
+use drive_fleet::{DriveHandle, Snapshot, Until};
 use futures_util::FutureExt as _;
 use tokio::time::{Instant, timeout_at};
 
@@ -114,7 +114,12 @@ impl Desk {
         self.record(caller, drive, &request).whenever();
         let left = (arrived + self.config.patience).saturating_duration_since(Instant::now());
         let settled = self.plant.command(caller, request, left);
-        let taken = drive.wait_until(|snapshot| snapshot.stop.is_some_and(|stop| stop.taken));
+        // By what it has shown since: that it took a stop of before does not tell that nobody has run it behind that.
+        let has_taken = |snapshot: &Snapshot| {
+            let is_seen = snapshot.status.as_ref().is_some_and(|status| status.at > arrived);
+            is_seen && snapshot.stop.is_some_and(|stop| stop.taken)
+        };
+        let taken = drive.wait_until(has_taken);
         // It is on its way before anything is looked at, and goes on whoever waits.
         tokio::select! {
             biased;
@@ -123,7 +128,7 @@ impl Desk {
                 Err(rejected) => Err(Refusal::rule(rejected.to_string())),
             },
             // A drive that has left shows nothing any more.
-            Some(_) = async { taken.await.stop.filter(|stop| stop.taken) } => Ok(()),
+            Some(()) = async { has_taken(&*taken.await).then_some(()) } => Ok(()),
         }
     }
 

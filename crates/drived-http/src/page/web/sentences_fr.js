@@ -274,7 +274,7 @@ export const SENTENCES_FR = {
   'a stop at the drive (RUN is off in 0020h and 002Ch)': 'un arrêt au variateur (RUN est à 0 dans 0020h et 002Ch)',
   'see to the panel and the inputs (n06 to n08), and start it again if it is to run': 'voir la console et les entrées (n06 à n08), puis le redémarrer s’il doit tourner',
   'another reference in 0002h than was given': 'une autre référence dans 0002h que celle qui a été donnée',
-  'n39 was changed and acts at the next power-up: switch the drive off and on, then forget() reads it again': 'n39 a été modifié et agit à la prochaine mise sous tension : couper et remettre le variateur, puis forget() le relit',
+  'n39 was changed and acts at the next power-up: switch the drive off and on': 'n39 a été modifié et agit à la prochaine mise sous tension : couper et remettre le variateur',
 
   // What a drive from a file does not tell, and why it refuses.
   'which way it turns cannot be seen, as far as is known': 'le sens de rotation ne se voit pas, pour autant qu’on sache',

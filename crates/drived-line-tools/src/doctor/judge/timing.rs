@@ -144,7 +144,7 @@ pub(super) fn in_pieces(case: &Case<'_>, explained: &[u8]) -> Option<Verdict> {
     let milliseconds = longest.as_millis() / 5 * 5 + 10;
     let chunk_gap = format!(
         "say chunk_gap = \"{milliseconds}ms\" of this line in the configuration of drived: it waits so long for the rest of an answer, and a \
-         stop waits for that where one is damaged"
+         stop waits for that where one is damaged; drived plan says what the line carries then"
     );
     Some(Verdict::new(
         Defect::AnswersInPieces,

@@ -50,8 +50,6 @@ impl Asking {
                 (record::Ending::Answered | record::Ending::Exception, []) => (false, &exchange.answer[..]),
                 _ => (echoed, heard),
             };
-            // Behind an echo it is the slave's time.
-            let pause = if echoed { Duration::ZERO } else { exchange.pause };
             let Some(ending) = ending(&config, exchange.ending, heard) else { continue };
             let asked = Asked {
                 slave,
@@ -66,8 +64,8 @@ impl Asking {
                 after: exchange
                     .took
                     .saturating_sub(characters(&config, exchange.request.len() + heard.len()))
-                    .saturating_sub(pause),
-                pause,
+                    .saturating_sub(exchange.pause),
+                pause: exchange.pause,
                 running: self.running.clone(),
                 strays_before: if first { strays_before } else { 0 },
                 dithered: dithered && first,

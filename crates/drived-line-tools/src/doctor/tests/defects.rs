@@ -21,6 +21,7 @@ enum Broken {
     InterferenceByTheSecond,
     HeldBack(u64),
     InPieces(u64),
+    EchoAndPieces(u64),
     SlowByAnEeprom,
     SlowN65,
     Late(u64),
@@ -80,6 +81,11 @@ async fn broken(broken: Broken, bench: &Bench) {
             let pauses_inside = Some(Duration::from_millis(millis));
             line.set_defects(Defects { pauses_inside, ..Defects::default() });
         }
+        Broken::EchoAndPieces(millis) => {
+            line.set_fault(Fault::Echo, ALWAYS);
+            let pauses_inside = Some(Duration::from_millis(millis));
+            line.set_defects(Defects { pauses_inside, ..Defects::default() });
+        }
         Broken::SlowByAnEeprom => bench.machine(3).set_turnaround(Some(Duration::from_millis(180))),
         // n65 is 5 ms, and it waits 60.
         Broken::SlowN65 => bench.machine(2).set_turnaround(Some(Duration::from_millis(60))),
@@ -131,6 +137,7 @@ const TABLE: &[(Broken, &[Found])] = &[
     (Broken::HeldBack(10), &[(Defect::AdapterHoldsBack, &[])]),
     (Broken::InPieces(25), &[(Defect::AnswersInPieces, &[])]),
     (Broken::InPieces(45), &[(Defect::AnswersInPieces, &[])]),
+    (Broken::EchoAndPieces(45), &[(Defect::AnswersInPieces, &[])]),
     (Broken::SlowByAnEeprom, &[(Defect::SlowDrive, &[3])]),
     (Broken::SlowN65, &[(Defect::SlowDrive, &[2])]),
     (Broken::Late(600), &[(Defect::LateAnswers, &[1, 2, 3])]),
