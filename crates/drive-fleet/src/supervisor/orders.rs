@@ -235,8 +235,8 @@ impl Supervisor {
         false
     }
 
-    /// What became of a setpoint that has given its place while it was being sent: something later was sent, or never will be.
-    fn conclude_dropped(&mut self, outcome: Outcome) {
+    /// What became of a setpoint that has given its place while it was being sent: something later was written, or never will be.
+    pub(super) fn conclude_dropped(&mut self, outcome: Outcome) {
         if let Some((asker, order)) = self.dropped_for_later.take() {
             self.conclude_order(asker, &order, outcome);
         }
@@ -347,7 +347,6 @@ impl Supervisor {
                         self.withdrawal = None;
                     }
                     self.set_phase(Phase::Sending(job));
-                    self.conclude_dropped(Outcome::NotConfirmed(Unconfirmed::Superseded));
                     return Some((job, None));
                 }
                 Ok(None) => {

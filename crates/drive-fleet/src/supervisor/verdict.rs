@@ -29,11 +29,15 @@ impl Supervisor {
         else {
             return;
         };
+        // Where nothing was written, or nothing was done, the drive holds what it held.
+        let holds = |error: &Error| error.has_written_nothing() || error.kind() == ErrorKind::Exception;
+        let holds = result.as_ref().err().is_some_and(holds);
+        if !holds {
+            self.conclude_dropped(Outcome::NotConfirmed(Unconfirmed::Superseded));
+        }
         match result {
             Ok(()) => self.setpoint_given(now, setpoint),
             Err(error) => {
-                // Where nothing was written, or nothing was done, the drive holds what it held.
-                let holds = error.has_written_nothing() || error.kind() == ErrorKind::Exception;
                 self.given.take_if(|_| !holds);
                 let is_start = self.active.as_ref().is_some_and(Active::is_start);
                 match error.kind() {

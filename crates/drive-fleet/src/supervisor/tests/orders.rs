@@ -118,6 +118,18 @@ fn a_setpoint_that_gave_its_place_to_one_that_is_never_sent_is_not_told_as_super
     rig.pass(500 * MS);
     assert_eq!(rig.outcome(second), Some(&Outcome::Expired));
     assert!(matches!(rig.outcome(first), Some(Outcome::OutcomeUnknown(_))), "{:?}", rig.outcome(first));
+
+    // Nor where its driver had no time to write it.
+    let mut rig = Rig::ready();
+    let first = rig.order(setpoint(31));
+    assert!(matches!(rig.next(), Step::Do { job: Job::SetSetpoint(..), .. }));
+    let second = rig.order(setpoint(22));
+    rig.machine.handle_dropped(rig.now);
+    assert!(matches!(rig.next(), Step::Do { job: Job::SetSetpoint(..), .. }));
+    rig.machine.handle_reply(rig.now, Reply::Setpoint(Err(port_error(PortError::Expired))));
+    rig.pass(500 * MS);
+    assert_eq!(rig.outcome(second), Some(&Outcome::Expired));
+    assert!(matches!(rig.outcome(first), Some(Outcome::OutcomeUnknown(_))), "{:?}", rig.outcome(first));
 }
 
 /// What is shown as its setpoint is what it is started at, whoever has written the reference since; a group has just given it.
