@@ -10,7 +10,8 @@ use crate::outcome::Outcome;
 pub enum ExitAction {
     /// It was left as it was: it stands, or its policy says so, or nothing may be written to it.
     Left,
-    /// **Alarm**: its motor turns, or turned when it was last seen. This fleet had not started it, and left it.
+    /// **Alarm**: its motor turns, or turned when it was last seen, by this fleet or by an earlier run whose record it has. This fleet had not
+    /// started it, and left it.
     LeftTurning,
     /// It was stopped, with this outcome.
     Stopped(Outcome),

@@ -81,6 +81,12 @@ impl Supervisor {
                 self.exit_by_stop(now, mode, release);
             }
             (OnExit::Stop(_), OnExitAdopted::Report) if turns => self.exit_ends(ExitAction::LeftTurning),
+            // What is known of it is the record of an earlier run alone: nobody has seen what became of that.
+            (OnExit::Stop(_) | OnExit::Release(_), _)
+                if self.link != Link::Connected && self.unadopted().is_some() =>
+            {
+                self.exit_ends(ExitAction::LeftTurning);
+            }
             (OnExit::Release(_), _) if self.stands() => self.exit = Exit::Release,
             (OnExit::Stop(_) | OnExit::Release(_), _) => self.exit_ends(ExitAction::Left),
         }
@@ -95,7 +101,7 @@ impl Supervisor {
     /// All that end together are done. Gives whether the job in flight has to be dropped for it.
     pub(crate) fn handle_leave(&mut self) -> bool {
         // It may have been stopped since.
-        if self.exit == Exit::Done(ExitAction::LeftTurning) && !self.turns() {
+        if self.exit == Exit::Done(ExitAction::LeftTurning) && self.stands() {
             self.exit = Exit::Done(ExitAction::Left);
         }
         self.leaving = Leaving::OnceStopped;

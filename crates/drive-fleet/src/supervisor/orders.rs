@@ -325,10 +325,8 @@ impl Supervisor {
                 Phase::Sending(_) | Phase::Verifying { .. } | Phase::Awaiting { .. } => return None,
             }
             let (order, expires) = (active.order, active.expires());
-            // Whatever it has waited for: who ends moves nothing any more.
-            if self.is_exiting() && !active.asker.is_exit() {
-                let gone = self.gone();
-                self.end_unsent(now, Outcome::Refused(gone));
+            if let Some(refused) = self.refused_since(active) {
+                self.end_unsent(now, Outcome::Refused(refused));
                 continue;
             }
             if expires <= now {

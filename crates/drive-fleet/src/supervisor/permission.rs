@@ -110,6 +110,26 @@ impl Supervisor {
             .then_some(Refused::StopPending)
     }
 
+    /// Why an order that was taken on is not sent any more, whatever it has waited for: its drive ends, is only read by now, or may not be
+    /// commanded any more by whoever has given it.
+    pub(super) fn refused_since(&self, active: &Active) -> Option<Refused> {
+        if active.asker.is_exit() {
+            return None;
+        }
+        if self.is_exiting() {
+            return Some(self.gone());
+        }
+        if !self.settings.control && !matches!(active.order, Order::AcceptIdentity(_)) {
+            return Some(Refused::ReadOnly);
+        }
+        match &active.asker {
+            Asker::Caller { act, .. } if !self.settings.commanders.allow(&act.commander) => {
+                Some(Refused::Commander(act.commander.to_string()))
+            }
+            _ => None,
+        }
+    }
+
     pub(super) fn refuse_at_once(
         &self,
         asker: &Asker,
@@ -188,7 +208,13 @@ impl Supervisor {
                         self.allow_setpoint(now, setpoint)?;
                         Some(Job::SetSetpoint(setpoint, (!self.was_just_at_rest(now)).then_some(direction)))
                     }
-                    _ => Some(Job::Start(direction)),
+                    _ => {
+                        // It was given within the limits of then.
+                        if let Some(given) = self.given {
+                            self.allow_setpoint(now, given.setpoint)?;
+                        }
+                        Some(Job::Start(direction))
+                    }
                 }
             }
         })

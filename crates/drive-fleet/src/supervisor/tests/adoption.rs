@@ -47,6 +47,20 @@ fn a_run_whose_record_the_drives_word_denies_is_not_ours_is_not_withdrawn_and_le
 }
 
 #[test]
+fn who_ends_before_a_drive_was_heard_of_whose_run_there_is_a_record_tells_that_its_motor_may_turn() {
+    for (record, told) in [(record(&Rig::controlled()), ExitAction::LeftTurning), (None, ExitAction::Left)] {
+        let mut rig = Rig::new(DriveSettings { run_before: record, ..settings() });
+        rig.drive.failing = Some(PortError::Timeout { after: 500 * MS });
+        rig.pass(1_000 * MS);
+        assert_eq!(exits(&mut rig), Some(told.clone()));
+        rig.machine.handle_leave();
+        rig.pass(100 * MS);
+        assert_eq!(rig.machine.exit_action(), Some(&told));
+        assert_eq!(rig.machine.left().run.is_some(), told.is_alarm(), "the next run adopts it");
+    }
+}
+
+#[test]
 fn a_run_of_before_is_told_as_ours_once_the_drives_words_tell_anything_of_it() {
     let mut rig = Rig::new(DriveSettings { run_before: record(&Rig::controlled()), ..settings() });
     rig.drive.run();

@@ -297,6 +297,40 @@ fn a_start_that_waits_as_its_drive_ends_is_refused_and_never_sent() {
 }
 
 #[test]
+fn a_start_that_waits_is_judged_by_the_settings_that_hold_when_it_is_sent() {
+    let nobody = Commanders::Only(vec!["somebody else".to_owned()]);
+    let for_nobody = DriveSettings { commanders: nobody, ..settings() };
+    let lower = FrequencyLimits { high: Some(Frequency::from_hertz(15)), ..FrequencyLimits::default() };
+    let limited = DriveSettings { limits: lower, ..settings() };
+    let read = DriveSettings { control: false, ..settings() };
+    for (changed, given_before) in [(&for_nobody, false), (&read, false), (&limited, false), (&limited, true)]
+    {
+        let mut rig = Rig::ready();
+        let start = if given_before {
+            // As a group does: the setpoint first, and then its start.
+            rig.order(setpoint(22));
+            rig.pass(200 * MS);
+            let since = rig.now - 500 * MS;
+            let setpoint = Some(Frequency::from_hertz(22).into());
+            let leave = rig.machine.leave(since, "tester", Direction::Forward, setpoint);
+            rig.others_start = true;
+            let asker = rig.asker();
+            rig.machine.handle_order(rig.now, asker, START, Some(leave.unwrap()), None);
+            CallId(rig.next_call)
+        } else {
+            rig.others_start = true;
+            rig.order(run_at(22))
+        };
+        rig.pass(100 * MS);
+        rig.machine.handle_settings(rig.now, changed);
+        rig.others_start = false;
+        rig.pass(500 * MS);
+        assert!(matches!(rig.outcome(start), Some(Outcome::Refused(_))), "{:?}", rig.outcome(start));
+        assert!(!rig.drive.log.iter().any(|job| matches!(job, Job::Start(_))), "{:?}", rig.drive.log);
+    }
+}
+
+#[test]
 fn a_start_whose_setpoint_is_sent_as_its_drive_is_left_gets_no_run_word() {
     let on_exit = OnExit::Leave;
     let mut rig = Rig::new(DriveSettings { on_exit, ..settings() });
