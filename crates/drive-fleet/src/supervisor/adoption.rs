@@ -38,6 +38,8 @@ impl Supervisor {
         let Adoption::Kept(record) = &self.adoption else { return };
         let why = match self.checks.identity() {
             IdentityCheck::Unchecked => return,
+            // A stop that nobody has seen confirmed waits until it may be given again.
+            _ if !self.settings.control && record.stop.is_some() => return,
             _ if !self.settings.control => "the drive is only read",
             _ if crate::mutant!(
                 "run-of-another-drive-adopted",

@@ -243,6 +243,9 @@ impl Supervisor {
         self.checks.reconfigure(now, settings);
         self.pace.reconfigure(now, settings.periods);
         self.settings = settings.clone();
+        if self.link == Link::Connected {
+            self.adopt_run(now);
+        }
         self.check_limits();
         self.changed = true;
     }

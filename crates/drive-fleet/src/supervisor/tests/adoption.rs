@@ -61,6 +61,23 @@ fn who_ends_before_a_drive_was_heard_of_whose_run_there_is_a_record_tells_that_i
 }
 
 #[test]
+fn a_stop_of_before_waits_while_its_drive_is_only_read_and_is_given_once_it_may_be() {
+    let stop = Some(StopOrder::from(StopMode::Ramp));
+    let identity = Rig::controlled().drive.identity.to_string();
+    let record = RunRecord::of(|| Some(identity), Some(RUN), stop);
+    let read = DriveSettings { control: false, run_before: record, ..settings() };
+    let mut rig = Rig::new(read.clone());
+    rig.drive.run();
+    rig.stands = Some(RUN);
+    rig.pass(2_000 * MS);
+    assert_eq!(rig.drive.writes(), []);
+    assert!(rig.machine.left().run.is_some_and(|run| run.stop.is_some()), "it is kept");
+    rig.machine.handle_settings(rig.now, &DriveSettings { control: true, ..read });
+    rig.pass(1_000 * MS);
+    assert!(rig.drive.writes().contains(&Job::Stop(StopMode::Ramp)), "{:?}", rig.drive.writes());
+}
+
+#[test]
 fn a_run_of_before_is_told_as_ours_once_the_drives_words_tell_anything_of_it() {
     let mut rig = Rig::new(DriveSettings { run_before: record(&Rig::controlled()), ..settings() });
     rig.drive.run();
