@@ -189,6 +189,9 @@ pub struct LineConfig {
 }
 
 impl LineConfig {
+    /// The longest pause inside a frame that an adapter is taken to make where nothing is said of it.
+    pub const USUAL_CHUNK_GAP: Duration = Duration::from_millis(20);
+
     /// The machine of what this line speaks.
     pub(crate) fn machine(&self) -> Box<dyn Machine> {
         self.protocol.machine(self.serial, self.chunk_gap, self.echo)
@@ -261,7 +264,7 @@ impl LineConfig {
             broadcast_pause: Duration::from_millis(100),
             slave_change_gap: Duration::ZERO,
             // FTDI's adapters deliver every 16 ms as delivered.
-            chunk_gap: Duration::from_millis(20),
+            chunk_gap: Self::USUAL_CHUNK_GAP,
             echo,
             #[cfg(feature = "serial")]
             rs485: None,

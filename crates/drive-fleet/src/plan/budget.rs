@@ -15,9 +15,6 @@ const ANSWER: usize = 2;
 /// Bytes of the answer to a frame for a watchdog: a word that is read, or what a loop-back has carried.
 const FED: usize = 5;
 
-/// Milliseconds of the longest pause that adapters usually make inside an answer: as long as a line allows for that nothing is said of.
-const USUAL_PAUSE: u128 = 20;
-
 /// What a line gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -67,7 +64,11 @@ impl LineBudget {
             serial: if config.protocol.is_paced() { Some(config.serial) } else { None },
             protocol: config.protocol,
             response: Duration::from_millis(10),
-            pause: if config.chunk_gap.as_millis() > USUAL_PAUSE { config.chunk_gap } else { Duration::ZERO },
+            pause: if config.chunk_gap.as_nanos() > LineConfig::USUAL_CHUNK_GAP.as_nanos() {
+                config.chunk_gap
+            } else {
+                Duration::ZERO
+            },
             response_timeout: config.response_timeout,
             broadcast_turnaround: config.broadcast_pause,
             slave_change_gap: config.slave_change_gap,

@@ -26,6 +26,14 @@ impl Asker {
         }
     }
 
+    /// The name of the commander; `None` for a policy.
+    pub(super) fn commander(&self) -> Option<&str> {
+        match self {
+            Self::Caller { act, .. } => Some(&act.commander),
+            Self::Policy(_) => None,
+        }
+    }
+
     pub(super) fn name(&self) -> Arc<str> {
         match self {
             Self::Caller { act, .. } => Arc::clone(&act.commander),

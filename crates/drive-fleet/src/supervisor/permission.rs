@@ -95,6 +95,13 @@ impl Supervisor {
 
     /// Why nobody of this name may give this order now.
     fn refuse_commander(&self, name: Option<&str>, order: &Order) -> Option<Refused> {
+        let accepts = matches!(order, Order::AcceptIdentity(_));
+        let pending = crate::mutant!("start-amid-a-stop", self.stopping.is_some(), false) && !accepts;
+        self.may_not_command(name, order).or_else(|| pending.then_some(Refused::StopPending))
+    }
+
+    /// Why nobody of this name may command the drive so, stop or none.
+    fn may_not_command(&self, name: Option<&str>, order: &Order) -> Option<Refused> {
         // Nothing is sent by it, and whoever only reads a drive is told as well that it is another.
         let accepts = matches!(order, Order::AcceptIdentity(_));
         if crate::mutant!("read-only-moved", !self.settings.control && !accepts, false) {
@@ -103,11 +110,8 @@ impl Supervisor {
         if self.is_exiting() {
             return Some(self.gone());
         }
-        if let Some(name) = name.filter(|name| !self.settings.commanders.allow(name)) {
-            return Some(Refused::Commander(name.to_owned()));
-        }
-        (crate::mutant!("start-amid-a-stop", self.stopping.is_some(), false) && !accepts)
-            .then_some(Refused::StopPending)
+        let stranger = name.filter(|name| !self.settings.commanders.allow(name));
+        stranger.map(|name| Refused::Commander(name.to_owned()))
     }
 
     /// Why an order that was taken on is not sent any more, whatever it has waited for: its drive ends, is only read by now, or may not be
@@ -116,18 +120,7 @@ impl Supervisor {
         if active.asker.is_exit() {
             return None;
         }
-        if self.is_exiting() {
-            return Some(self.gone());
-        }
-        if !self.settings.control && !matches!(active.order, Order::AcceptIdentity(_)) {
-            return Some(Refused::ReadOnly);
-        }
-        match &active.asker {
-            Asker::Caller { act, .. } if !self.settings.commanders.allow(&act.commander) => {
-                Some(Refused::Commander(act.commander.to_string()))
-            }
-            _ => None,
-        }
+        self.may_not_command(active.asker.commander(), &active.order)
     }
 
     pub(super) fn refuse_at_once(
@@ -136,11 +129,7 @@ impl Supervisor {
         order: &Order,
         leave: Option<Leave>,
     ) -> Option<Refused> {
-        let name = match asker {
-            Asker::Caller { act, .. } => Some(&*act.commander),
-            Asker::Policy(_) => None,
-        };
-        if let Some(refused) = self.refuse_commander(name, order) {
+        if let Some(refused) = self.refuse_commander(asker.commander(), order) {
             return Some(refused);
         }
         let is_over =
