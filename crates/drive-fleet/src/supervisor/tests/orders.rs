@@ -301,21 +301,21 @@ fn a_start_that_waits_is_judged_by_the_settings_that_hold_when_it_is_sent() {
     let nobody = Commanders::Only(vec!["somebody else".to_owned()]);
     let for_nobody = DriveSettings { commanders: nobody, ..settings() };
     let lower = FrequencyLimits { high: Some(Frequency::from_hertz(15)), ..FrequencyLimits::default() };
-    let limited = DriveSettings { limits: lower, ..settings() };
+    let limited = DriveSettings { limits: lower.clone(), ..settings() };
     let read = DriveSettings { control: false, ..settings() };
     for (changed, given_before) in [(&for_nobody, false), (&read, false), (&limited, false), (&limited, true)]
     {
         let mut rig = Rig::ready();
         let start = if given_before {
             // As a group does: the setpoint first, and then its start.
-            rig.order(setpoint(22));
-            rig.pass(200 * MS);
-            let since = rig.now - 500 * MS;
-            let setpoint = Some(Frequency::from_hertz(22).into());
-            let leave = rig.machine.leave(since, "tester", Direction::Forward, setpoint);
-            rig.others_start = true;
-            let asker = rig.asker();
-            rig.machine.handle_order(rig.now, asker, START, Some(leave.unwrap()), None);
+            let of_group = Some(Frequency::from_hertz(22).into());
+            let leave = rig.machine.leave(rig.now, "tester", Direction::Forward, of_group).ok();
+            for order in [setpoint(22), START] {
+                rig.others_start = order == START;
+                let asker = rig.asker();
+                rig.machine.handle_order(rig.now, asker, order, leave, None);
+                rig.pass(200 * MS);
+            }
             CallId(rig.next_call)
         } else {
             rig.others_start = true;
@@ -325,6 +325,8 @@ fn a_start_that_waits_is_judged_by_the_settings_that_hold_when_it_is_sent() {
         rig.machine.handle_settings(rig.now, changed);
         rig.others_start = false;
         rig.pass(500 * MS);
+        let by_limit = matches!(rig.outcome(start), Some(Outcome::Refused(Refused::Limit(_))));
+        assert_eq!(by_limit, changed.limits == lower, "{:?}", rig.outcome(start));
         assert!(matches!(rig.outcome(start), Some(Outcome::Refused(_))), "{:?}", rig.outcome(start));
         assert!(!rig.drive.log.iter().any(|job| matches!(job, Job::Start(_))), "{:?}", rig.drive.log);
     }
