@@ -56,7 +56,7 @@ impl Fleet {
     }
 
     /// Gives a drive other settings. Its task, its snapshot, its orders and a stop under way go on; what depends on the
-    /// settings is checked anew. Whether its line can keep the new periods is not judged here.
+    /// settings is checked anew. A start of a motor at rest that they refuse is broken off, also where it is being carried out. Whether its line can keep the new periods is not judged here.
     ///
     /// # Errors
     /// [`FleetError::NoSuchDrive`]; [`FleetError::Setting`] for settings that contradict themselves or the family, and for a

@@ -382,16 +382,16 @@ impl Desk {
             }
             Urgent::Withdraw(id) => self.supervisor.handle_withdrawal(now, id),
             Urgent::Settings(settings) => {
-                self.supervisor.handle_settings(now, &settings);
+                let drops = self.supervisor.handle_settings(now, &settings);
                 self.settings = Some(settings);
-                false
+                drops
             }
             Urgent::Renamed(settings, snapshots) => {
                 // What has happened so far has happened to the drive of the old name.
                 self.publish();
-                self.supervisor.handle_settings(now, &settings);
+                let drops = self.supervisor.handle_settings(now, &settings);
                 (self.settings, self.snapshots) = (Some(settings), snapshots);
-                false
+                drops
             }
             Urgent::Exit(why, round) => {
                 self.round = Some(round);

@@ -1,6 +1,6 @@
 //! Who asks, and what he may do.
 
-use std::fmt;
+use std::{fmt, future::pending, pin::Pin, sync::Arc};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,18 +17,59 @@ pub struct Caller {
     pub rights: Rights,
     /// Which drives he may command; all of them where it is not said.
     pub scope: Option<Scope>,
+    /// For how long he is heard.
+    pub heard: Heard,
 }
 
 impl Caller {
     /// Somebody who may do this with every drive.
     pub fn new(name: impl Into<String>, origin: impl Into<String>, rights: Rights) -> Self {
-        Self { name: name.into(), origin: origin.into(), rights, scope: None }
+        Self { name: name.into(), origin: origin.into(), rights, scope: None, heard: Heard::default() }
     }
 
     /// Whether he may command this drive of a plant with these groups, as far as his rights go. Whoever may stop, may stop
     /// every drive: this is not asked then.
     pub fn may_command(&self, drive: &str, groups: &[Group]) -> bool {
         self.scope.as_ref().is_none_or(|scope| scope.has(drive, groups))
+    }
+}
+
+/// For how long whoever asks is heard: until that by which he was let in holds no more, or the connection has gone without which nobody hears what
+/// becomes of it. By default for ever.
+#[derive(Clone, Default)]
+pub struct Heard(Option<Arc<dyn Fn() -> End + Send + Sync>>);
+
+type End = Pin<Box<dyn Future<Output = ()> + Send>>;
+
+impl Heard {
+    /// Until one of these futures is over, of which each who waits for the end gets his own.
+    pub fn until<F: Future<Output = ()> + Send + 'static>(
+        end: impl Fn() -> F + Send + Sync + 'static,
+    ) -> Self {
+        Self(Some(Arc::new(move || Box::pin(end()))))
+    }
+
+    /// Waits until he is not heard any more. Safe to drop.
+    pub async fn ends(&self) {
+        match &self.0 {
+            Some(end) => end().await,
+            None => pending().await,
+        }
+    }
+}
+
+/// Who somebody is does not depend on it.
+impl PartialEq for Heard {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl Eq for Heard {}
+
+impl fmt::Debug for Heard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.0.is_some() { "for a while" } else { "for ever" })
     }
 }
 

@@ -57,7 +57,7 @@ use super::{
     token_desk,
     tokens::Tokens,
 };
-use drived_config::rights::Rights;
+use drived_config::rights::{Caller, Heard, Rights};
 
 /// How long an answer may take to begin: the longest wait for a command, and 10 s.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(40);
@@ -111,8 +111,8 @@ impl Gate {
     {
         let of_api = request.uri().path().starts_with(API);
         let (peer, proxied) = door.whose(peer, request.version(), request.headers());
-        let mut authority = Authority::Freely;
-        let passed = self.pass(door, (peer, proxied), request, &asking, &mut authority).await;
+        let mut heard = Heard::default();
+        let passed = self.pass(door, (peer, proxied), request, &asking, &mut heard).await;
         let mut answer = match passed {
             Ok(answer) => answer,
             Err(refusal) => {
@@ -142,8 +142,6 @@ impl Gate {
         }
         // An answer that is made as it goes, such as an event stream or a capture.
         let goes_on = answer.status().is_success() && answer.body().size_hint().exact().is_none();
-        let gate = Arc::clone(self);
-        let authority = authority.ends(move |authority| gate.holds(authority), self.changes.subscribe());
         protect(answer.headers_mut(), of_api, door.encrypted);
         if goes_on {
             // What ends it ends its connection, so that whoever reads it sees so at once.
@@ -151,19 +149,19 @@ impl Gate {
         }
         answer.map(|body| {
             Body::new(match goes_on {
-                true => Kept::stream(body, asking, self.end.clone(), authority),
+                true => Kept::stream(body, asking, self.end.clone(), async move { heard.ends().await }),
                 false => Kept::whole(body, asking),
             })
         })
     }
 
     async fn pass<B>(
-        &self,
+        self: &Arc<Self>,
         door: &Door,
         (peer, proxied): (Peer, bool),
         request: Request<B>,
         asking: &Asking,
-        authority: &mut Authority,
+        heard: &mut Heard,
     ) -> Result<Response, Refusal>
     where
         B: hyper::body::Body<Data = Bytes, Error: Into<axum::BoxError>> + Send + 'static,
@@ -197,14 +195,13 @@ impl Gate {
         }
         let logs_in = parts.method == Method::POST && path == LOGIN;
         let freely = freely(door, peer, proxied, &parts.headers);
-        let caller = match logs_in {
-            true => freely,
-            false => {
-                let caller;
-                (caller, *authority) = self.caller(freely, peer, &parts.headers, stops)?;
-                caller
-            }
+        let (caller, authority) = match logs_in {
+            true => (freely, Authority::Freely),
+            false => self.caller(freely, peer, &parts.headers, stops)?,
         };
+        let is_known = authority != Authority::Freely || peer.address().is_none();
+        *heard = self.heard(authority);
+        let caller = Caller { heard: heard.clone(), ..caller };
         // But one that says whom it means.
         let stops_whatever_it_says = stops && !path.contains("/selected/");
         let read = async |limit: usize| {
@@ -213,7 +210,6 @@ impl Gate {
                 asking.is_whole();
                 return Ok(came);
             }
-            let is_known = *authority != Authority::Freely || peer.address().is_none();
             let body = read(body, limit, if is_known { BODY_WITHIN } else { BODY_OF_NOBODY_WITHIN }).await?;
             asking.is_whole();
             Ok(body)

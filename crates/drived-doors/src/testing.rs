@@ -45,7 +45,12 @@ fn router() -> Router {
     async fn came(Extension(Arrived(at)): Extension<Arrived>) -> String {
         format!("{} ms ago", at.elapsed().as_millis())
     }
+    async fn waits(Extension(caller): Extension<Caller>) -> &'static str {
+        caller.heard.ends().await;
+        "not heard any more"
+    }
     Router::new()
+        .route("/api/v1/drives/{name}/reset", post(waits))
         .route("/api/v1/state", get(who).post(who))
         .route("/api/v1/stop", post(who))
         .route("/api/v1/drives/{name}/start", post(started))

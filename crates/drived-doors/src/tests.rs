@@ -3,6 +3,7 @@
 use std::fs;
 
 use axum::http::{StatusCode, header};
+use futures_util::future::{Either, select};
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _, DuplexStream};
 
 use super::{gate::Peer, *};
@@ -47,6 +48,28 @@ async fn a_token_has_the_rights_of_its_role_until_it_is_removed() {
         assert_eq!(rig.ask(&asked).await.body, format!("{name} http 127.0.0.1 {rights}"));
         rig.gate.tokens.as_ref().unwrap().remove(name).unwrap();
         rig.ask(&asked).await.assert_refused(401);
+    }
+}
+
+#[tokio::test]
+async fn whoever_has_asked_for_something_that_waits_is_heard_until_his_token_is_removed() {
+    let rig = Rig::new("heard");
+    let token = |name| format!("Bearer {}", rig.token(name, Role::Operate));
+    let (stays, goes) = (token("stays"), token("goes"));
+    let ask = async |bearer: &String| {
+        let headers = [("authorization", bearer.as_str())];
+        rig.ask(&Asked { path: "/api/v1/drives/pump/reset", headers: &headers, ..START }).await.body
+    };
+    let (waits, still_waits) = (std::pin::pin!(ask(&goes)), std::pin::pin!(ask(&stays)));
+    let both = select(waits, still_waits);
+    let both = match select(both, std::pin::pin!(sleep(Duration::from_millis(100)))).await {
+        Either::Left(_) => panic!("nobody has taken anything away"),
+        Either::Right(((), both)) => both,
+    };
+    rig.gate.tokens.as_ref().unwrap().remove("goes").unwrap();
+    match both.await {
+        Either::Left((said, _)) => assert_eq!(said, "not heard any more"),
+        Either::Right(_) => panic!("nobody has taken it away"),
     }
 }
 

@@ -8,6 +8,7 @@ use std::{
 };
 
 use drive_fleet::Place;
+use drived_config::rights::Heard;
 use tokio::{sync::watch, time::Instant};
 
 /// How many addresses are remembered. Who comes back after having been forgotten has to write a word without run again.
@@ -51,9 +52,13 @@ impl Connection {
         !*self.closed.borrow()
     }
 
-    /// Where it is told that he has, or that nobody serves him any more.
-    pub(super) fn gone(&self) -> watch::Receiver<bool> {
-        self.closed.subscribe()
+    /// Until he has, or nobody serves him any more.
+    pub(super) fn heard(&self) -> Heard {
+        let closed = self.closed.subscribe();
+        Heard::until(move || {
+            let mut closed = closed.clone();
+            async move { drop(closed.wait_for(|is_closed| *is_closed).await) }
+        })
     }
 }
 

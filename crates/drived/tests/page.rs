@@ -298,12 +298,16 @@ fn look_with(
     let port =
         TcpListener::bind("127.0.0.1:0").expect("a port is free").local_addr().expect("it has one").port();
     let address = format!("127.0.0.1:{port}");
-    let _served = Running::start_unread(&[arguments, &["--http", &address]].concat());
-    while std::net::TcpStream::connect(&address).is_err() {
+    let log = path(&format!("page-{scene}.log"));
+    let file = std::fs::File::create(&log).expect("the directory can be written");
+    let mut served = Running::start_unread(&[arguments, &["--http", &address]].concat(), file);
+    // The system takes a connection before the program knows where its page is, of which it gives links.
+    let is_there = || std::net::TcpStream::connect(&address).is_ok();
+    let hello = "GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
+    while !is_there() || ask(port, hello).is_empty() {
+        assert!(!served.has_ended(), "{scene}: {}", std::fs::read_to_string(&log).unwrap_or_default());
         look_again();
     }
-    // The system takes a connection before the program knows where its page is, of which it gives links.
-    assert!(!ask(port, "GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").is_empty());
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/page.py");
     let mut looking = Command::new(python)
         .arg(script)
@@ -318,6 +322,7 @@ fn look_with(
     }
     let seen = looking.wait().expect("it is a child");
     assert!(seen.success(), "{scene} is not as it should be");
+    let _ = std::fs::remove_file(log);
 }
 
 /// A Python with Playwright beside a Chromium, or `None` with the reason printed. `DRIVED_PYTHON` names the interpreter.

@@ -76,19 +76,17 @@ impl Supervisor {
                 self.exit_by_stop(now, mode, release);
             }
             (OnExit::Leave, _) if stopping => self.exit_by_stop(now, StopMode::Ramp, false),
-            (OnExit::Leave, _) => self.exit_ends(ExitAction::Left),
+            (OnExit::Leave, _) if !self.owes_stop_of_before() => self.exit_ends(ExitAction::Left),
             (OnExit::Stop(_) | OnExit::Release(_), OnExitAdopted::Stop(mode)) if turns => {
                 self.exit_by_stop(now, mode, release);
             }
             (OnExit::Stop(_), OnExitAdopted::Report) if turns => self.exit_ends(ExitAction::LeftTurning),
             // What is known of it is the record of an earlier run alone: nobody has seen what became of that.
-            (OnExit::Stop(_) | OnExit::Release(_), _)
-                if self.link != Link::Connected && self.unadopted().is_some() =>
-            {
+            _ if self.link != Link::Connected && self.unadopted().is_some() => {
                 self.exit_ends(ExitAction::LeftTurning);
             }
             (OnExit::Release(_), _) if self.stands() => self.exit = Exit::Release,
-            (OnExit::Stop(_) | OnExit::Release(_), _) => self.exit_ends(ExitAction::Left),
+            _ => self.exit_ends(ExitAction::Left),
         }
         true
     }

@@ -230,8 +230,9 @@ impl Supervisor {
         }
     }
 
-    /// Other settings hold from now on. The motor, the orders and the stops under way go on.
-    pub(crate) fn handle_settings(&mut self, now: Instant, settings: &DriveSettings) {
+    /// Other settings hold from now on. The motor, the orders and the stops under way go on, but a start that they refuse, as long as its motor
+    /// is at rest. Gives whether the job in flight has to be dropped.
+    pub(crate) fn handle_settings(&mut self, now: Instant, settings: &DriveSettings) -> bool {
         if *self.name != *settings.name {
             let old = std::mem::replace(&mut self.name, Arc::from(settings.name.as_str()));
             self.emit_by(EventKind::Renamed(old), Cause::policy(Policy::Settings));
@@ -248,6 +249,7 @@ impl Supervisor {
         }
         self.check_limits();
         self.changed = true;
+        self.end_forbidden_start(now)
     }
 
     /// The drive's name.

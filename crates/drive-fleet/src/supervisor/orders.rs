@@ -168,10 +168,29 @@ impl Supervisor {
             }
             return false;
         }
-        let Some(active) = self.active.as_ref().filter(|active| is_it(&active.asker)) else {
-            let ours = self.lease.is_some() || self.is_starting();
-            return ours && self.started_by == Some(id) && self.take_back(now);
+        if self.active.as_ref().is_some_and(|active| is_it(&active.asker)) {
+            return self.break_off(now);
+        }
+        let ours = self.lease.is_some() || self.is_starting();
+        ours && self.started_by == Some(id) && self.take_back(now)
+    }
+
+    /// A start that is being carried out for a motor at rest, and that the settings would refuse by now, is broken off. Gives whether the job
+    /// in flight has to be dropped for it.
+    pub(super) fn end_forbidden_start(&mut self, now: Instant) -> bool {
+        let is_sent = |active: &&Active| active.is_start() && matches!(active.phase, Phase::Sending(_));
+        let Some(active) = self.active.as_ref().filter(|_| self.stands()).filter(is_sent) else {
+            return false;
         };
+        let setpoint = active.order.setpoint().or(self.given.map(|given| given.setpoint));
+        let by_limit = || setpoint.and_then(|setpoint| self.allow_setpoint(now, setpoint).err());
+        self.refused_since(active).or_else(by_limit).is_some() && self.break_off(now)
+    }
+
+    /// Nothing more of the order that is carried out is sent. Gives whether the job in flight has to be dropped for it.
+    fn break_off(&mut self, now: Instant) -> bool {
+        let Some(active) = &self.active else { return false };
+        let id = active.asker.id();
         // A motor that runs already goes to the setpoint of a start, before that is sent or without it.
         let moves = active.is_start()
             && self.lease.is_some()
@@ -190,7 +209,7 @@ impl Supervisor {
                 }
                 true
             }
-            _ if self.started_by == Some(id) => self.take_back(now),
+            _ if id.is_some() && self.started_by == id => self.take_back(now),
             Phase::Verifying { job: Job::SetSetpoint(..), .. } => {
                 self.end_active(Refused::Withdrawn, Unconfirmed::Withdrawn);
                 moves && self.take_back(now)

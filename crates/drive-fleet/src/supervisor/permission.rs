@@ -274,7 +274,7 @@ impl Supervisor {
         }
     }
 
-    fn allow_setpoint(&self, now: Instant, setpoint: Setpoint) -> Result<(), Refused> {
+    pub(super) fn allow_setpoint(&self, now: Instant, setpoint: Setpoint) -> Result<(), Refused> {
         let moving = self.status.as_ref().filter(|status| !status.value.is_undriven());
         let last = moving.and_then(|status| {
             self.given.or_else(|| crate::mutant!("unknown-setpoint-unlimited", shown(status), None))

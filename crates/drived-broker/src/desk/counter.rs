@@ -125,7 +125,7 @@ impl Counter {
         answers: &impl Answers,
     ) {
         let named = named(&request);
-        match self.plant.begin_asked_after(caller, request, asked_after, None) {
+        match self.plant.begin_asked_after(caller, request, asked_after) {
             Ok(told) => self.follow(caller, told, record, answers),
             Err(rejected) => self.tell_refusal(caller, record, answers, named, rejected.into()),
         }

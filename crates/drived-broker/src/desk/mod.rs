@@ -17,7 +17,10 @@ use std::{collections::HashMap, sync::Arc, time::Duration};
 
 use drive_fleet::StopOrder;
 use serde_json::Value;
-use tokio::{sync::mpsc, time::Instant};
+use tokio::{
+    sync::{mpsc, watch},
+    time::Instant,
+};
 
 pub use self::{
     alarms::AlarmMessage,
@@ -28,6 +31,7 @@ use self::{
     counter::{Counter, Named, Order},
     pace::Pace,
 };
+use drived_config::rights::Heard;
 use drived_doors::{
     Caller,
     audit::{Audit, Kind, Record},
@@ -94,6 +98,8 @@ pub struct Desk<A> {
     paces: HashMap<String, Pace>,
     /// When each target was last stopped so.
     stopped: HashMap<(Target, StopOrder), Instant>,
+    /// As long as it is there those are heard who come here: behind a reload another one takes its place, with what they may do then.
+    open: watch::Sender<()>,
 }
 
 impl<A: Answers + Sync> Desk<A> {
@@ -102,7 +108,13 @@ impl<A: Answers + Sync> Desk<A> {
         let (orders, waiting) = mpsc::channel(WAITING);
         let counter = Arc::new(Counter::new(plant, audit));
         tokio::spawn(Arc::clone(&counter).work(waiting));
-        Self { counter, orders, paces: HashMap::new(), stopped: HashMap::new() }
+        Self {
+            counter,
+            orders,
+            paces: HashMap::new(),
+            stopped: HashMap::new(),
+            open: watch::Sender::default(),
+        }
     }
 
     /// Takes a message.
@@ -149,6 +161,8 @@ impl<A: Answers + Sync> Desk<A> {
         };
         let (audited, to) = (record.clone(), answers.clone());
         let asked_after = asked_after.map_or(request.arrived, |after| after.min(request.arrived));
+        let open = self.open.subscribe();
+        let caller = Caller { heard: Heard::until(move || ended(open.clone())), ..caller };
         let order =
             Order::Command { caller: caller.clone(), request, asked_after, record: audited, answers: to };
         if self.orders.try_send(order).is_err() {
@@ -208,4 +222,8 @@ impl<A: Answers + Sync> Desk<A> {
         let body = Some(message.said.body.clone()).filter(|body| *body != Value::Null);
         Record { body, ..Record::new(Kind::Command, &message.caller, message.what.clone()) }
     }
+}
+/// Until the desk is dropped.
+async fn ended(mut open: watch::Receiver<()>) {
+    while open.changed().await.is_ok() {}
 }

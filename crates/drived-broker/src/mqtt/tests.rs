@@ -130,6 +130,37 @@ async fn a_while() {
     sleep(Duration::from_secs(10)).await;
 }
 
+/// Behind a reload another face takes its place, with those that may command then.
+#[tokio::test(start_paused = true)]
+async fn a_start_that_waits_for_others_of_its_line_is_not_begun_behind_the_end_of_its_face() {
+    for ends in [false, true] {
+        let bench = Bench::of(4).await;
+        for drive in &bench.plant.plant.fleet().drives()[..2] {
+            let action = Action::Start {
+                direction: drive_core::Direction::Forward,
+                setpoint: Some(Frequency::from_hertz(20).into()),
+                until: drive_fleet::Until::InForce,
+            };
+            let target = Target::Drive(drive.name().to_string());
+            let arrived = Instant::now();
+            let request = Request { id: None, target, action, expects: None, lifetime: LIFETIME, arrived };
+            bench.plant.plant.begin(&Caller::new("anna", "test", Rights::ALL), request).unwrap();
+        }
+        bench.ask("drive/pump_4/command", &start("waits").to_string());
+        sleep(Duration::from_millis(200)).await;
+        assert!(!(0..4).any(|number| bench.runs(number)), "all wait or are begun");
+        let Bench { plant, mqtt, .. } = bench;
+        let mut open = Some(mqtt);
+        if let Some(mqtt) = open.take_if(|_| ends) {
+            mqtt.close().await;
+        }
+        a_while().await;
+        let running = plant.machines.iter().map(|machine| machine.observe().running);
+        assert_eq!(running.collect::<Vec<_>>(), [true, true, false, !ends]);
+        drop(open);
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn what_there_is_is_retained_and_expires_with_the_daemon() {
     let bench = Bench::of(2).await;

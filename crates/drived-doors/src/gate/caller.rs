@@ -1,6 +1,6 @@
 //! Who asks, by what he is let in, and whoever is not.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::http::{HeaderMap, StatusCode, header, request::Parts};
 use tokio::time::Instant;
@@ -15,7 +15,7 @@ use crate::{
 };
 use drived_config::{
     kept::sha256,
-    rights::{Caller, Rights, Role},
+    rights::{Caller, Heard, Rights, Role},
 };
 
 impl Gate {
@@ -33,6 +33,18 @@ impl Gate {
                 is_begun && of_hash(sha256, *role)
             }
         }
+    }
+
+    /// For how long somebody is heard who was let in by this.
+    pub(super) fn heard(self: &Arc<Self>, authority: Authority) -> Heard {
+        if authority == Authority::Freely {
+            return Heard::default();
+        }
+        let (gate, changes) = (Arc::clone(self), self.changes.subscribe());
+        Heard::until(move || {
+            let gate = Arc::clone(&gate);
+            authority.clone().ends(move |authority| gate.holds(authority), changes.clone())
+        })
     }
 
     /// Who asks, and by what he is let in. A token that is wrong is never taken for none.

@@ -116,7 +116,8 @@ impl Desk {
     }
 
     fn caller(&self, by: &Connection) -> Caller {
-        Caller::new(self.config.name.clone(), format!("modbus {}", by.peer), self.config.rights)
+        let caller = Caller::new(self.config.name.clone(), format!("modbus {}", by.peer), self.config.rights);
+        Caller { heard: by.heard(), ..caller }
     }
 
     fn record(

@@ -163,23 +163,19 @@ impl Running {
 
     /// The same with an environment of its own.
     pub(crate) fn of(command: &mut Command) -> Self {
-        Self::with_output(command, Stdio::piped)
+        Self::with_output(command, Stdio::piped(), Stdio::piped())
     }
 
-    /// Nobody reads what it says.
-    pub(crate) fn start_unread(arguments: &[&str]) -> Self {
-        Self::with_output(&mut drived(arguments), Stdio::null)
+    /// Nobody reads what it says, but whoever wants to know why it has ended.
+    pub(crate) fn start_unread(arguments: &[&str], log: std::fs::File) -> Self {
+        Self::with_output(&mut drived(arguments), Stdio::null(), log.into())
     }
 
-    fn with_output(command: &mut Command, output: fn() -> Stdio) -> Self {
+    fn with_output(command: &mut Command, out: Stdio, err: Stdio) -> Self {
         let runtime = command.get_envs().find(|(name, _)| *name == "XDG_RUNTIME_DIR");
         let runtime = runtime.and_then(|(_, folder)| folder).map(PathBuf::from);
-        let mut child = command
-            .stdin(Stdio::piped())
-            .stdout(output())
-            .stderr(output())
-            .spawn()
-            .expect("the program starts");
+        let mut child =
+            command.stdin(Stdio::piped()).stdout(out).stderr(err).spawn().expect("the program starts");
         let input = child.stdin.take();
         let lines = child.stdout.take().map(BufReader::new);
         Self { child, input, lines, runtime }

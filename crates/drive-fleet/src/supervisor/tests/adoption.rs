@@ -48,15 +48,25 @@ fn a_run_whose_record_the_drives_word_denies_is_not_ours_is_not_withdrawn_and_le
 
 #[test]
 fn who_ends_before_a_drive_was_heard_of_whose_run_there_is_a_record_tells_that_its_motor_may_turn() {
-    for (record, told) in [(record(&Rig::controlled()), ExitAction::LeftTurning), (None, ExitAction::Left)] {
-        let mut rig = Rig::new(DriveSettings { run_before: record, ..settings() });
+    let ran = record(&Rig::controlled());
+    let to_be_stopped = ran.clone().map(|run| run.stopped_by(Some(StopOrder::from(StopMode::Ramp))));
+    let turning = ExitAction::LeftTurning;
+    for (record, on_exit, told) in [
+        (ran.clone(), OnExit::default(), turning.clone()),
+        (None, OnExit::default(), ExitAction::Left),
+        // To leave a motor as it is leaves no stop ungiven.
+        (ran, OnExit::Leave, ExitAction::Left),
+        (to_be_stopped, OnExit::Leave, turning),
+    ] {
+        let is_kept = record.is_some();
+        let mut rig = Rig::new(DriveSettings { run_before: record, on_exit, ..settings() });
         rig.drive.failing = Some(PortError::Timeout { after: 500 * MS });
         rig.pass(1_000 * MS);
         assert_eq!(exits(&mut rig), Some(told.clone()));
         rig.machine.handle_leave();
         rig.pass(100 * MS);
         assert_eq!(rig.machine.exit_action(), Some(&told));
-        assert_eq!(rig.machine.left().run.is_some(), told.is_alarm(), "the next run adopts it");
+        assert_eq!(rig.machine.left().run.is_some(), is_kept, "the next run adopts it");
     }
 }
 

@@ -333,6 +333,54 @@ fn a_start_that_waits_is_judged_by_the_settings_that_hold_when_it_is_sent() {
 }
 
 #[test]
+fn a_start_whose_driver_reads_for_it_is_broken_off_by_settings_that_refuse_it_and_one_that_turns_goes_on() {
+    let nobody = Commanders::Only(vec!["somebody else".to_owned()]);
+    let for_nobody = DriveSettings { commanders: nobody, ..settings() };
+    let lower = FrequencyLimits { high: Some(Frequency::from_hertz(15)), ..FrequencyLimits::default() };
+    let limited = DriveSettings { limits: lower, ..settings() };
+    let other = DriveSettings { name: "another name".to_owned(), ..settings() };
+    for (changed, forbids) in [(&for_nobody, true), (&limited, true), (&other, false)] {
+        let mut rig = Rig::ready();
+        let start = rig.order(run_at(22));
+        let Step::Do { job: job @ Job::SetSetpoint(..), .. } = rig.next() else { panic!() };
+        assert_eq!(rig.machine.handle_settings(rig.now, changed), forbids);
+        match forbids {
+            true => rig.machine.handle_dropped(rig.now),
+            false => {
+                let reply = rig.drive.answer(job);
+                rig.machine.handle_reply(rig.now, reply);
+            }
+        }
+        rig.pass(100 * MS);
+        let outcome = rig.outcome(start);
+        assert_eq!(outcome.is_some_and(|outcome| !outcome.is_confirmed()), forbids);
+        let starts = rig.drive.log.iter().filter(|job| matches!(job, Job::Start(_))).count();
+        assert_eq!(starts == 0, forbids, "{:?}", rig.drive.log);
+        // Its run word may be on the wire: the motor is brought down, whatever it does.
+        let mut rig = Rig::ready();
+        let start = rig.order(run_at(22));
+        let mut step = rig.next();
+        while !matches!(step, Step::Do { job: Job::Start(_), .. }) {
+            let Step::Do { job, .. } = step else { panic!("{step:?}") };
+            let reply = rig.drive.answer(job);
+            rig.machine.handle_reply(rig.now, reply);
+            step = rig.next();
+        }
+        let drops = rig.machine.handle_settings(rig.now, changed);
+        if drops {
+            rig.machine.handle_dropped(rig.now);
+        }
+        let step = rig.next();
+        assert_eq!(matches!(step, Step::Do { job: Job::Stop(_), .. }), forbids, "{step:?}");
+        assert_eq!(drops, forbids, "{:?}", rig.outcome(start));
+    }
+    let mut rig = Rig::ready();
+    rig.order(run_at(22));
+    rig.pass(2_000 * MS);
+    assert!(!rig.machine.handle_settings(rig.now, &limited) && !rig.machine.stopping.is_some());
+}
+
+#[test]
 fn a_start_whose_setpoint_is_sent_as_its_drive_is_left_gets_no_run_word() {
     let on_exit = OnExit::Leave;
     let mut rig = Rig::new(DriveSettings { on_exit, ..settings() });

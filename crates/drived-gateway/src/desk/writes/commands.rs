@@ -228,8 +228,7 @@ impl Desk {
         let record = self.record(who.caller, drive, &request);
         record.done().await.map_err(|error| Refusal::rule(error.to_string()))?;
         who.hears()?;
-        let gone = Some(who.by.gone());
-        match self.plant.command_asked_after(who.caller, request, asked_after, gone, left()).await {
+        match self.plant.command_asked_after(who.caller, request, asked_after, left()).await {
             Ok(view) => self.judged(drive, view.outcome, view.text.as_deref()),
             Err(Rejected::NoDrive(name)) => Err(Refusal::new(
                 ExceptionCode::GatewayPathUnavailable,

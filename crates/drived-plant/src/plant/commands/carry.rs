@@ -16,7 +16,7 @@ use drive_fleet::{
 };
 use futures_util::future::join_all;
 use tokio::{
-    sync::{Notify, watch},
+    sync::Notify,
     time::{Instant, sleep, timeout_at},
 };
 
@@ -31,7 +31,10 @@ use crate::plant::{
     Plant,
     views::{CommandView, SeveralView, Shown},
 };
-use drived_config::{names::Kind, rights::Caller};
+use drived_config::{
+    names::Kind,
+    rights::{Caller, Heard},
+};
 use drived_words::json::{milliseconds, unix};
 
 /// Outcomes of several drives that come within this time are told together.
@@ -121,6 +124,8 @@ pub(super) struct Work(Arc<Inner>);
 struct Inner {
     plant: Plant,
     request: Request,
+    /// For how long whoever asks is heard.
+    heard: Heard,
     group: Group,
     /// Where each stands among them, by his name.
     numbers: HashMap<Arc<str>, usize>,
@@ -168,6 +173,7 @@ impl Work {
         Self(Arc::new(Inner {
             plant,
             request,
+            heard: caller.heard.clone(),
             group,
             numbers,
             parts,
@@ -206,17 +212,17 @@ impl Work {
 
     /// Begins, and goes on whether or not anybody waits. What is asked of the drives is on its way to them when this
     /// returns, whatever the caller's task has still to spend; only a start of several waits for its turn. A stop is under way.
-    pub(super) fn begin(self, command: Command, stops: Option<Posted>, gone: Option<watch::Receiver<bool>>) {
+    pub(super) fn begin(self, command: Command, stops: Option<Posted>) {
         let posted = stops.unwrap_or_else(|| self.post());
         let first = Arc::clone(&command.borrow());
         self.0.plant.0.tell_command(&first, None);
         let runtime = self.0.plant.0.runtime.clone();
-        runtime.spawn(self.carried(posted, command, gone));
+        runtime.spawn(self.carried(posted, command));
     }
 
-    pub(super) async fn carried(self, posted: Posted, command: Command, gone: Option<watch::Receiver<bool>>) {
+    pub(super) async fn carried(self, posted: Posted, command: Command) {
         tokio::select! {
-            () = self.work(posted, gone.as_ref()) => {}
+            () = self.work(posted) => {}
             () = self.tell_changes(&command) => {}
         }
         self.tell(&command);
@@ -271,7 +277,7 @@ impl Work {
         }
     }
 
-    async fn work(&self, posted: Posted, gone: Option<&watch::Receiver<bool>>) {
+    async fn work(&self, posted: Posted) {
         match posted {
             Posted::Stop(stop) => self.stopped(0, &stop).await,
             Posted::StopOfSeveral(stops) => {
@@ -290,16 +296,21 @@ impl Work {
                     let outcome = tokio::select! {
                         biased;
                         outcome = order.finished() => outcome,
-                        () = left(gone) => heard_by_nobody(order).await,
+                        () = self.0.heard.ends() => heard_by_nobody(order).await,
                     };
                     self.end(number, &outcome);
                 }))
                 .await;
             }
             Posted::Nothing => {
-                let Inner { plant, request, .. } = &*self.0;
+                let Inner { plant, request, heard, .. } = &*self.0;
                 let expires = request.arrived + request.lifetime.time();
-                let Ok(_turn) = timeout_at(expires, plant.0.group_starts.lock()).await else {
+                let turn = tokio::select! {
+                    biased;
+                    () = heard.ends() => return self.end_each(&Outcome::Refused(Refused::Withdrawn)),
+                    turn = timeout_at(expires, plant.0.group_starts.lock()) => turn,
+                };
+                let Ok(_turn) = turn else {
                     let text = "another start of a group was under way";
                     return self.end_all(OutcomeWord::Expired, GROUP_BUSY, text);
                 };
@@ -395,6 +406,10 @@ impl Work {
         self.end_with(number, Some(outcome), told(outcome));
     }
 
+    fn end_each(&self, outcome: &Outcome) {
+        (0..self.members().len()).for_each(|number| self.end(number, outcome));
+    }
+
     /// Ends what has no outcome of its own.
     fn end_all(&self, word: OutcomeWord, reason: &'static str, text: &str) {
         for number in 0..self.members().len() {
@@ -458,16 +473,7 @@ impl CommandView {
     }
 }
 
-/// Until whoever has asked is gone, and for ever where nobody knows.
-async fn left(gone: Option<&watch::Receiver<bool>>) {
-    match gone {
-        // Who serves him no more says so by having ended.
-        Some(gone) => drop(gone.clone().wait_for(|is_gone| *is_gone).await),
-        None => std::future::pending().await,
-    }
-}
-
-/// What becomes of an order whose asker is gone: it goes on where it has begun, and else it never does.
+/// What becomes of an order whose asker is not heard any more: it goes on where it has begun, and else it never does.
 async fn heard_by_nobody(order: Ticket) -> Outcome {
     if order.has_begun() {
         return order.finished().await;

@@ -1,6 +1,6 @@
 //! Commands: each has an id, an expiry that counts from its arrival, and an outcome that is told under its id.
 //!
-//! A command goes on when whoever asked for it has gone. A stop never expires, and is carried out each time it arrives.
+//! A command goes on when whoever asked for it has gone, but where it waits and he is [not heard any more](drived_config::rights::Heard). A stop never expires, and is carried out each time it arrives.
 
 pub mod age;
 mod body;
@@ -23,7 +23,6 @@ use drive_fleet::{DriveHandle, Place, ShownIdentity, StopOrder, Until};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::{
-    sync::watch,
     task::yield_now,
     time::{Instant, timeout},
 };
@@ -231,7 +230,7 @@ impl Plant {
         wait: Duration,
     ) -> Result<Arc<CommandView>, Rejected> {
         let asked_after = request.arrived;
-        self.command_asked_after(caller, request, asked_after, None, wait).await
+        self.command_asked_after(caller, request, asked_after, wait).await
     }
 
     /// The same, begun by [`begin_asked_after`](Self::begin_asked_after).
@@ -243,10 +242,9 @@ impl Plant {
         caller: &Caller,
         request: Request,
         asked_after: Instant,
-        gone: Option<watch::Receiver<bool>>,
         wait: Duration,
     ) -> Result<Arc<CommandView>, Rejected> {
-        let told = self.begin_asked_after(caller, request, asked_after, gone)?;
+        let told = self.begin_asked_after(caller, request, asked_after)?;
         Ok(settled(told, wait).await)
     }
 
@@ -263,12 +261,12 @@ impl Plant {
     /// [`Rejected`]: nothing was done.
     pub fn begin(&self, caller: &Caller, request: Request) -> Result<Told, Rejected> {
         let asked_after = request.arrived;
-        self.begin_asked_after(caller, request, asked_after, None)
+        self.begin_asked_after(caller, request, asked_after)
     }
 
     /// The same with what may have been on its way since `asked_after`, such as over a broker: a stop by another door since then may have
     /// come after it, and it is not begun. What came through the same door came in its order. What a drive is asked and nothing
-    /// of which has begun is withdrawn, if it is no stop, once whoever has asked is `gone`.
+    /// of which has begun is withdrawn, if it is no stop, once whoever has asked is not heard any more.
     ///
     /// # Errors
     /// [`Rejected`]: nothing was done.
@@ -277,7 +275,6 @@ impl Plant {
         caller: &Caller,
         mut request: Request,
         asked_after: Instant,
-        gone: Option<watch::Receiver<bool>>,
     ) -> Result<Told, Rejected> {
         let (has_right, right) = match request.action {
             Action::Stop(_) => (caller.rights.stop, "stop"),
@@ -329,7 +326,7 @@ impl Plant {
             Found::Again(told) => Ok(told.subscribe()),
             Found::New(command) => {
                 let told = command.subscribe();
-                work.begin(command, None, gone);
+                work.begin(command, None);
                 Ok(told)
             }
         }
@@ -356,13 +353,13 @@ impl Plant {
             self.0.commands.find_or_add(caller, asked, first)?;
         let told = command.subscribe();
         match work {
-            Some(work) => work.begin(command, Some(stops), None),
+            Some(work) => work.begin(command, Some(stops)),
             None => {
                 let (plant, caller) = (self.clone(), caller.clone());
                 self.0.runtime.spawn(async move {
                     let work = Work::new(plant, &caller, &request, meant);
                     work.tell(&command);
-                    work.carried(stops, command, None).await;
+                    work.carried(stops, command).await;
                 });
             }
         }
