@@ -12,10 +12,10 @@ use drive_fleet::{
     ConcernKind, DriveSettings, EventKind, ExitAction, Fleet, IdentityCheck, Link, OnExit, OnFault, Outcome,
     Periods, Received, Refused, Times, WatchdogCheck, WatchdogContract,
 };
-use drive_sim::{Fault, Panel, SimLine, Wiring, models::atv21::Atv21};
+use drive_sim::{Fault, Panel, SimLine, SimSlave, Wiring, models::atv21::Atv21};
 use drive_testing::witness::Witnesses;
 use support::{
-    drives,
+    drives::{self, Five},
     plant::{ADDRESS, MOTOR, Plant, Site, common_settings, contract, controlled},
 };
 use tokio::time::{Instant, sleep};
@@ -79,6 +79,34 @@ async fn rule_1_a_drive_whose_settings_have_no_ramp_stop_is_stopped_by_another()
         })
         .await;
     assert!(!plant.machine().observe().running);
+}
+
+/// Between the setpoint of a start, which was read back, and its run word another master writes its own (`LFr`; FA01h; 0002h).
+#[tokio::test(start_paused = true)]
+async fn rule_3_a_start_at_another_masters_reference_is_not_confirmed_and_its_motor_is_brought_to_rest() {
+    each(async |family| {
+        let (register, word) = match drives::five(family) {
+            Five::Atv21 => (0xFA01, 4_000),
+            Five::Atv28 | Five::Atv58 => (401, 400),
+            Five::Atv312 => (8_502, 400),
+            Five::Omron3g3ev => (0x0002, 400),
+        };
+        let plant = Plant::single(family, |_| {});
+        plant.motor().ready(60 * SECOND).await.expect("it gets ready");
+        let machine = plant.machine().clone();
+        let writes = |machine: &SimSlave| machine.requests(0x06) + machine.requests(0x10);
+        let before = writes(&machine);
+        let other = tokio::spawn(async move {
+            machine.wait_until(|_| writes(&machine) > before + 1).await;
+            machine.written_by_another(register, word)
+        });
+        let outcome = plant.motor().start_at(Direction::Forward, Frequency::from_hertz(25)).await;
+        other.await.expect("it is written").expect("another master may");
+        assert!(!outcome.is_confirmed(), "{family}: {outcome}");
+        sleep(30 * SECOND).await;
+        assert!(!plant.machine().observe().running, "{family}");
+    })
+    .await;
 }
 
 #[tokio::test(start_paused = true)]

@@ -85,13 +85,13 @@ impl Driver {
         self.at_once(None, |drive| drive.run_word_for(direction))
     }
 
-    /// What a call gave, and the run command of this side as it stands behind it.
+    /// What a call gave, and the run command of this side as it stands behind it, of a drive that says to be this, and that is started at this.
     pub(crate) async fn carry_out(
         &mut self,
         keeper: &mut Keeper,
         job: Job,
         mut lifetime: Lifetime,
-        identity: Option<String>,
+        (identity, asked_for): (Option<String>, Option<Setpoint>),
     ) -> (Reply, Option<Lease>) {
         if let Job::Start(direction) = job
             && let Some(word) = self.run_word_for(direction)
@@ -102,7 +102,7 @@ impl Driver {
             // The disk's time is the order's: a start is not sent late for it (rule 2).
             lifetime = lifetime.without(began.elapsed());
         }
-        let reply = call(&mut *self.drive, job, lifetime).await;
+        let reply = call(&mut *self.drive, job, lifetime, asked_for).await;
         (reply, self.lease())
     }
 }
@@ -126,7 +126,7 @@ fn lifetimes(job: Job, lifetime: Lifetime) -> Lifetimes {
 }
 
 /// A call that goes on where it was cut, if it is such a one.
-async fn call(drive: &mut dyn Drive, job: Job, lifetime: Lifetime) -> Reply {
+async fn call(drive: &mut dyn Drive, job: Job, lifetime: Lifetime, asked_for: Option<Setpoint>) -> Reply {
     if let Some(kept) = drive.kept_mut() {
         match (job.keeps(), job) {
             (Some(number), _) => kept.begin(number),
@@ -134,7 +134,7 @@ async fn call(drive: &mut dyn Drive, job: Job, lifetime: Lifetime) -> Reply {
             (None, _) => kept.pause(),
         }
     }
-    let reply = asked(drive, job, lifetime).await;
+    let reply = asked(drive, job, lifetime, asked_for).await;
     // What found no answer goes on as well.
     let ended = reply.error().is_none_or(|error| !matches!(error, Error::Port { .. }));
     if let (Some(kept), Some(number), true) = (drive.kept_mut(), job.keeps(), ended) {
@@ -151,12 +151,14 @@ async fn given(drive: &mut dyn Drive, setpoint: Setpoint, start: Option<Directio
     drive.set_setpoint(setpoint).await
 }
 
-async fn asked(drive: &mut dyn Drive, job: Job, lifetime: Lifetime) -> Reply {
+async fn asked(drive: &mut dyn Drive, job: Job, lifetime: Lifetime, asked_for: Option<Setpoint>) -> Reply {
     *drive.lifetimes_mut() = lifetimes(job, lifetime);
     match job {
         Job::Stop(mode) => Reply::stopped(drive.slave(), mode, drive.stop(mode).await),
         Job::Withdraw => Reply::Withdrawn(drive.withdraw().await),
-        Job::Start(direction) => Reply::started(drive.slave(), direction, drive.start(direction).await),
+        Job::Start(direction) => {
+            Reply::started(drive.slave(), direction, asked_for, drive.start(direction).await)
+        }
         Job::SetSetpoint(setpoint, start) => Reply::Setpoint(given(drive, setpoint, start).await),
         Job::ResetFaults => Reply::Ordered(drive.reset_faults().await),
         Job::Release => Reply::Ordered(drive.release().await),

@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// How far the output may be from a setpoint that it has reached by its frequency alone.
-const NEAR: Frequency = Frequency::from_centihertz(50);
+pub(crate) const NEAR: Frequency = Frequency::from_centihertz(50);
 /// The same where the drive itself says that it is at its reference: its slip compensation moves the output.
 const NEAR_WITH_SLIP: Frequency = Frequency::from_hertz(3);
 

@@ -181,7 +181,8 @@ impl Talk {
                 Step::Do { job, lifetime, until, .. } => {
                     desk.begin_order();
                     let identity = desk.supervisor.says_what_it_is();
-                    (Some(driver.carry_out(keeper, job, lifetime, identity)), until)
+                    let asked_for = desk.supervisor.starts_at();
+                    (Some(driver.carry_out(keeper, job, lifetime, (identity, asked_for))), until)
                 }
             };
             let talking = call.is_some();
@@ -453,6 +454,7 @@ impl Desk {
                     tracing::debug!(%drive, "{}", happened.kind);
                     self.events.tell(drive, self.place.clone(), moment, happened);
                 }
+                Output::Untold(id) => drop(self.askers.remove(&id)),
                 Output::Told(id, told) => {
                     if let Some(asker) = self.askers.remove(&id) {
                         let _ = asker.send(told);

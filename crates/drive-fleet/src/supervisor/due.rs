@@ -33,6 +33,9 @@ impl Supervisor {
         }
         self.note_act(job);
         self.wearing = self.wears(job);
+        if let Job::Ask(_) = job {
+            self.begin_question();
+        }
         self.in_flight = Some(job);
         self.changed = true;
         Step::Do { job, on_turn, lifetime, until }

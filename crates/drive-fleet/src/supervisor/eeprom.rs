@@ -18,7 +18,7 @@ impl Supervisor {
             Job::RestoreWatchdog(_) => watchdog(EepromUse::Restore, self.exits_by),
             Job::Persist => self.active.as_ref().map(|active| (EepromUse::Save, active.cause())),
             Job::Ask(Question::Write(row, _)) if row.storage.may_wear() => {
-                self.questions.front().map(|(.., act)| (EepromUse::Parameter, Cause::Command(act.clone())))
+                self.questions.front().map(|asked| (EepromUse::Parameter, Cause::Command(asked.by.clone())))
             }
             _ => None,
         }

@@ -184,7 +184,8 @@ impl Supervisor {
         };
         let setpoint = active.order.setpoint().or(self.given.map(|given| given.setpoint));
         let by_limit = || setpoint.and_then(|setpoint| self.allow_setpoint(now, setpoint).err());
-        self.refused_since(active).or_else(by_limit).is_some() && self.break_off(now)
+        let refused = self.refused_since(active).or_else(by_limit);
+        crate::mutant!("forbidden-start-goes-on", refused.is_some(), false) && self.break_off(now)
     }
 
     /// Nothing more of the order that is carried out is sent. Gives whether the job in flight has to be dropped for it.
@@ -292,6 +293,12 @@ impl Supervisor {
         self.active
             .as_ref()
             .is_some_and(|active| active.is_start() && !matches!(active.phase, Phase::Prepare))
+    }
+
+    /// The setpoint with which the start is given that is carried out: its own, or the one that its group has just given.
+    pub(crate) fn starts_at(&self) -> Option<Setpoint> {
+        let active = self.active.as_ref().filter(|active| active.is_start())?;
+        active.setpoint_given.or(self.given.map(|given| given.setpoint))
     }
 
     /// Who waits for the order of which something is sent now, or may be.

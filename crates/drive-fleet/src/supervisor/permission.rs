@@ -120,7 +120,8 @@ impl Supervisor {
         if active.asker.is_exit() {
             return None;
         }
-        self.may_not_command(active.asker.commander(), &active.order)
+        let refused = self.may_not_command(active.asker.commander(), &active.order);
+        crate::mutant!("order-judged-once", refused, None)
     }
 
     pub(super) fn refuse_at_once(
@@ -143,7 +144,7 @@ impl Supervisor {
             let since = |at: Option<Instant>| at.is_some_and(|at| leave.since < at);
             since(self.start_asked_at) || leave.brings_setpoint && since(self.setpoint_asked_at)
         };
-        if leave.is_some_and(is_older) {
+        if crate::mutant!("group-overrules-a-later-start", leave.is_some_and(is_older), false) {
             return Some(Refused::Superseded);
         }
         (self.queue.len() >= QUEUE).then_some(Refused::QueueFull)

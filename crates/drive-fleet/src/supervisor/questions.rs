@@ -18,11 +18,12 @@ pub(crate) enum Question {
 }
 
 impl Question {
-    /// What is told of it when whoever carried it out has ended without a word: a write may have been sent.
+    /// What is told of it when nobody has said what became of it: a write may have been sent.
     pub(crate) fn abandoned(&self, slave: SlaveAddress) -> Refused {
         let Self::Write(row, _) = self else { return Refused::ShutDown };
         let exchange = Exchange { function: 6, register: Some(row.address) };
-        let problem = PortError::OutcomeUnknown("the fleet has ended meanwhile");
+        let problem =
+            PortError::OutcomeUnknown("its drive was lost or taken out meanwhile, or the fleet has ended");
         Refused::Drive(Error::Port { slave, exchange, problem })
     }
 }
@@ -35,15 +36,25 @@ pub(crate) enum Told {
     Written(Written),
 }
 
+/// Somebody's question.
+#[derive(Debug, Clone)]
+pub(super) struct Asked {
+    id: CallId,
+    question: Question,
+    pub(super) by: Act,
+    /// It is on its way to the drive, or was once.
+    begun: bool,
+}
+
 /// The questions that wait, the first perhaps in flight.
-pub(super) type Questions = VecDeque<(CallId, Question, Act)>;
+pub(super) type Questions = VecDeque<Asked>;
 
 impl Supervisor {
     /// Somebody asks. One that is dropped for something more urgent is asked again: a write looks first at what is there.
     pub(crate) fn handle_question(&mut self, id: CallId, name: &str, question: Question) {
         match self.refuse_question(name, question) {
             Some(refused) => self.outputs.push_back(Output::Told(id, Err(refused))),
-            None => self.questions.push_back((id, question, Act::of(name))),
+            None => self.questions.push_back(Asked { id, question, by: Act::of(name), begun: false }),
         }
     }
 
@@ -71,15 +82,22 @@ impl Supervisor {
     /// Askers do not wait any more. What is in flight is finished.
     pub(crate) fn forget_questions(&mut self, gone: impl Fn(CallId) -> bool) {
         let mut in_flight = matches!(self.in_flight, Some(Job::Ask(_)));
-        self.questions.retain(|(id, ..)| std::mem::take(&mut in_flight) || !gone(*id));
+        self.questions.retain(|asked| std::mem::take(&mut in_flight) || !gone(asked.id));
     }
 
     pub(super) fn question_job(&self) -> Option<Job> {
-        self.questions.front().map(|(_, question, _)| Job::Ask(*question))
+        self.questions.front().map(|asked| Job::Ask(asked.question))
+    }
+
+    /// The first of them is on its way.
+    pub(super) fn begin_question(&mut self) {
+        if let Some(asked) = self.questions.front_mut() {
+            asked.begun = true;
+        }
     }
 
     pub(super) fn handle_told(&mut self, told: Result<Told>) {
-        if let Some((id, ..)) = self.questions.pop_front() {
+        if let Some(Asked { id, .. }) = self.questions.pop_front() {
             self.outputs.push_back(Output::Told(id, told.map_err(Refused::from)));
         }
     }
@@ -87,19 +105,24 @@ impl Supervisor {
     /// What was found to be another drive than is meant is not written.
     pub(super) fn end_writes(&mut self) {
         let Some(stranger) = self.checks.stranger() else { return };
-        let is_write = |asked: &(CallId, Question, Act)| matches!(asked.1, Question::Write(..));
+        let is_write = |asked: &Asked| matches!(asked.question, Question::Write(..));
         let (writes, rest): (Questions, Questions) =
             mem::take(&mut self.questions).into_iter().partition(is_write);
         self.questions = rest;
-        for (id, ..) in writes {
-            self.outputs.push_back(Output::Told(id, Err(stranger.clone())));
-        }
+        self.end(writes, &stranger);
     }
 
     /// Nobody can be asked any more.
     pub(super) fn end_questions(&mut self, refused: &Refused) {
-        for (id, ..) in mem::take(&mut self.questions) {
-            self.outputs.push_back(Output::Told(id, Err(refused.clone())));
-        }
+        let all = mem::take(&mut self.questions);
+        self.end(all, refused);
+    }
+
+    /// Of a write that is on its way nobody knows what becomes of it.
+    fn end(&mut self, asked: Questions, refused: &Refused) {
+        self.outputs.extend(asked.into_iter().map(|Asked { id, question, begun, .. }| match question {
+            Question::Write(..) if begun => Output::Untold(id),
+            _ => Output::Told(id, Err(refused.clone())),
+        }));
     }
 }

@@ -2,11 +2,12 @@
 //! driver.
 
 use drive_core::{
-    Command, Control, Direction, Error, Motion, Refusal, Result, SlaveAddress, Status, StopMode, Stopped,
-    Verdict,
+    Command, Control, Direction, Error, Motion, Refusal, Result, Setpoint, SlaveAddress, Status, StopMode,
+    Stopped, Verdict,
 };
 
 use super::Reply;
+use crate::snapshot::NEAR;
 
 impl Reply {
     /// Of a stop: none is taken by a drive that goes on driving its motor.
@@ -21,16 +22,38 @@ impl Reply {
     }
 
     /// Of a start: none is in force in a drive that says what keeps its run command from acting, nor in one that has no output and of
-    /// which its driver knows no run command of this side. At a reference of zero nothing turns, and it is in force all the same.
-    pub(crate) fn started(slave: SlaveAddress, direction: Direction, result: Result<Status>) -> Self {
+    /// which its driver knows no run command of this side, nor in one that follows another reference than was `asked` for. At a reference of
+    /// zero nothing turns, and it is in force all the same.
+    pub(crate) fn started(
+        slave: SlaveAddress,
+        direction: Direction,
+        asked: Option<Setpoint>,
+        result: Result<Status>,
+    ) -> Self {
         Self::Ordered(result.and_then(|status| match status.verdict {
             Some(Verdict::NotInForce { because, .. }) => {
                 Err(not_shown(slave, Command::Start(direction), status, Some(because)))
+            }
+            _ if follows_another(asked, &status).is_some() => {
+                let because = follows_another(asked, &status);
+                Err(not_shown(slave, Command::Start(direction), status, because))
             }
             None if status.is_undriven() => Err(not_shown(slave, Command::Start(direction), status, None)),
             _ => Ok(status),
         }))
     }
+}
+
+/// Whether a motor that was started follows another reference than that with which it was: between the two another master may have written
+/// one, or the drive have lost its supply and with it the setpoint.
+pub(super) fn follows_another(asked: Option<Setpoint>, status: &Status) -> Option<Refusal> {
+    const ANOTHER: Refusal = Refusal::Overridden {
+        by: "another reference than the start was given with, of another master or behind a power cut,",
+        remedy: "see who writes it, and start again with the setpoint",
+    };
+    let Some((Setpoint::Frequency(asked), follows)) = asked.zip(status.reference) else { return None };
+    let is_another = follows.centihertz().abs_diff(asked.centihertz()) > NEAR.centihertz();
+    crate::mutant!("any-reference-started-at", is_another, false).then_some(ANOTHER)
 }
 
 fn not_shown(slave: SlaveAddress, command: Command, status: Status, because: Option<Refusal>) -> Error {

@@ -25,6 +25,8 @@ pub(crate) enum Output {
     Answer(CallId, Outcome),
     /// To one who asked a question.
     Told(CallId, Result<Told, Refused>),
+    /// To one whose write is on its way: nobody knows what becomes of it.
+    Untold(CallId),
 }
 
 impl Supervisor {

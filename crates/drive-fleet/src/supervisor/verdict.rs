@@ -3,14 +3,15 @@
 use std::time::Duration;
 
 use drive_core::{
-    Control, Error, ErrorKind, Lease, Measurements, PortError, Result, SETTLED_WITHIN, Setpoint, Status,
-    StopMode, Verdict,
+    Control, Error, ErrorKind, Lack, Lease, Measurements, PortError, Result, SETTLED_WITHIN, Setpoint,
+    Status, StopMode, Verdict,
 };
 use tokio::time::Instant;
 
 use super::{
     Asker, Job, Output, Supervisor,
     orders::{Active, Phase},
+    shown::follows_another,
 };
 use crate::{
     cause::Policy,
@@ -213,6 +214,10 @@ impl Supervisor {
             _ => true,
         };
         let verdict = status.verdict.filter(|verdict| is_its || *verdict != Verdict::InForce);
+        let verdict = match (verdict, follows_another(self.starts_at(), status)) {
+            (Some(Verdict::InForce), Some(because)) => Some(Verdict::lacks(Lack::Reference, because)),
+            (verdict, _) => verdict,
+        };
         match crate::mutant!("lost-start-believed", verdict, Some(Verdict::InForce)) {
             Some(Verdict::InForce) => {
                 let done = active.order.done(Some(status));

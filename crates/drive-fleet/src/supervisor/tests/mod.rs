@@ -313,7 +313,7 @@ impl Paper {
                     self.status.direction = Some(direction);
                     self.lease = Some(Lease::new(direction, 0x000F));
                 }
-                Reply::started(slave(), direction, self.status().map_err(of_a_write))
+                Reply::started(slave(), direction, None, self.status().map_err(of_a_write))
             }
             Job::SetSetpoint(setpoint, _) => {
                 if reached && self.obeys {
@@ -547,7 +547,7 @@ impl Rig {
     fn happened(&self) -> impl Iterator<Item = &Happened> {
         self.outputs.iter().filter_map(|output| match output {
             Output::Event(happened) => Some(happened),
-            Output::InForce(..) | Output::Answer(..) | Output::Told(..) => None,
+            Output::InForce(..) | Output::Answer(..) | Output::Told(..) | Output::Untold(_) => None,
         })
     }
 

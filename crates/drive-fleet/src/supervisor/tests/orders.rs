@@ -333,6 +333,34 @@ fn a_start_that_waits_is_judged_by_the_settings_that_hold_when_it_is_sent() {
 }
 
 #[test]
+fn a_start_whose_motor_follows_another_reference_than_it_was_given_is_not_confirmed_and_taken_back() {
+    for (follows, is_lost) in [(22, false), (22, true), (40, false), (40, true), (0, false)] {
+        let mut rig = Rig::ready();
+        let start = rig.order(run_at(22));
+        let Step::Do { job: job @ Job::SetSetpoint(..), .. } = rig.next() else { panic!() };
+        let reply = rig.drive.answer(job);
+        rig.machine.handle_reply(rig.now, reply);
+        let Step::Do { job: Job::Start(direction), .. } = rig.next() else { panic!() };
+        assert_eq!(rig.machine.starts_at(), Some(Frequency::from_hertz(22).into()));
+        rig.drive.run();
+        rig.drive.status.reference = Some(Frequency::from_hertz(follows));
+        rig.drive.lease = Some(Lease::new(direction, 0x000F));
+        rig.machine.handle_lease(rig.drive.lease);
+        let shown = rig.drive.status();
+        let reply = match is_lost {
+            false => Reply::started(slave(), direction, rig.machine.starts_at(), shown),
+            true => Reply::Ordered(Err(port_error(PortError::OutcomeUnknown("no answer")))),
+        };
+        rig.machine.handle_reply(rig.now, reply);
+        rig.pass(2_000 * MS);
+        let outcome = rig.outcome(start).cloned();
+        let is_ours = follows == 22;
+        assert_eq!(outcome.as_ref().is_some_and(Outcome::is_confirmed), is_ours, "{outcome:?}");
+        assert_eq!(rig.drive.log.contains(&Job::Stop(StopMode::Ramp)), !is_ours, "{:?}", rig.drive.log);
+    }
+}
+
+#[test]
 fn a_start_whose_driver_reads_for_it_is_broken_off_by_settings_that_refuse_it_and_one_that_turns_goes_on() {
     let nobody = Commanders::Only(vec!["somebody else".to_owned()]);
     let for_nobody = DriveSettings { commanders: nobody, ..settings() };

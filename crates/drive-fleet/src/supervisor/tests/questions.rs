@@ -52,6 +52,37 @@ fn a_parameter_is_written_once_in_its_turn_and_read_back() {
 }
 
 #[test]
+fn of_a_write_that_is_on_its_way_as_its_drive_ends_or_is_lost_nobody_says_that_it_was_not_written() {
+    for is_lost in [false, true] {
+        let mut rig = Rig::ready();
+        let write = rig.question(Question::Write(&ROW, 30));
+        while rig.machine.in_flight.is_none_or(|job| !matches!(job, Job::Ask(_))) {
+            let Step::Do { job, .. } = rig.next() else {
+                rig.machine.grant_turn();
+                rig.now += MS;
+                continue;
+            };
+            if !matches!(job, Job::Ask(_)) {
+                let reply = rig.drive.answer(job);
+                rig.machine.handle_reply(rig.now, reply);
+            }
+        }
+        let waits = rig.question(Question::Write(&ROW, 40));
+        match is_lost {
+            true => rig.machine.handle_line_lost(rig.now),
+            false => rig.machine.handle_exit(rig.now, Policy::Exit),
+        };
+        rig.drive.failing = Some(PortError::Timeout { after: 500 * MS });
+        rig.machine.handle_dropped(rig.now);
+        rig.pass(6_000 * MS);
+        assert!(matches!(rig.told(waits), Some(Err(_))), "{:?}", rig.told(waits));
+        assert_eq!(rig.told(write), None, "it is told as nobody's answer");
+        let untold = rig.outputs.iter().any(|output| matches!(output, Output::Untold(id) if *id == write));
+        assert!(untold, "{:?}", rig.outputs);
+    }
+}
+
+#[test]
 fn who_does_not_wait_any_more_leaves_his_place() {
     let mut rig = Rig::ready();
     let asked: Vec<CallId> = (0..16).map(|_| rig.question(Question::Read(&ROW))).collect();

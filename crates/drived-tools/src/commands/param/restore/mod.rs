@@ -255,8 +255,14 @@ async fn restore(
     if failure.is_none() {
         match keep(args, source, &carried).await {
             Ok((is_saved, how)) => {
-                saved = is_saved;
-                text.extend(how);
+                // What a cut of the supply has taken since it was read is not what was saved.
+                let put_back = match is_saved && !is_cut {
+                    true => verify(file, source, args.with_communication, &plan, &mut carried).await,
+                    false => None,
+                };
+                saved = is_saved && put_back.is_none();
+                text.extend(if put_back.is_none() { how } else { vec![NOT_SAVED.to_owned()] });
+                failure = put_back.map(|failure| (failure, false));
             }
             Err(why) => {
                 failure = Some((Failure::Drive(format!("all is written, and not saved: {why}")), false));

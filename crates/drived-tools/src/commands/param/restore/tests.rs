@@ -412,6 +412,25 @@ async fn a_write_that_the_drive_ignores_is_told_with_what_was_read_back() {
     assert_eq!(told.failure.unwrap().0.code(), 1);
 }
 
+/// As behind a cut of the supply between the last reading and the save.
+#[tokio::test(start_paused = true)]
+async fn what_the_drive_does_not_hold_any_more_behind_the_save_is_not_told_as_saved() {
+    let mut bench = Bench::of(Family::ATV312, SetUp::Factory);
+    let file = edited(bench.source.keep().await.unwrap(), &[("ACC", 45)]);
+    let machine = bench.machine.clone();
+    let cut = tokio::spawn(async move {
+        // That of ACC, and the save.
+        machine.wait_until(|_| machine.requests(0x06) > 1).await;
+        machine.poke(9_001, 30)
+    });
+    let told = say(&mut bench, &file, &["--write", "--save"]).await.unwrap();
+    assert!(cut.await.unwrap());
+    let Some((Failure::Drive(why), false)) = &told.failure else { panic!("{:?}", told.text) };
+    assert!(why.contains("ACC"), "{why}");
+    assert_eq!(told.json["saved"], json!(false));
+    assert!(!told.text.iter().any(|text| text.starts_with("saved")), "{:?}", told.text);
+}
+
 #[tokio::test(start_paused = true)]
 async fn the_line_itself_is_changed_only_if_that_is_asked_for_and_last() {
     let mut bench = Bench::of(Family::ATV312, SetUp::Factory);
