@@ -84,6 +84,15 @@ mod planted {
         }
     }
 
+    /// What outsiders found by several hands at one line.
+    #[test]
+    fn several_hands_find_what_outsiders_found() {
+        let names = ["order-judged-once", "group-overrules-a-later-start", "any-reference-started-at"];
+        let told = fuzz::find_plants_of(fuzz::Target::Hands, "several hands", &names, 1, 600);
+        println!("{told}");
+        assert_eq!((told.plants_found(), &told.finds), (names.len(), &Vec::new()), "{told}");
+    }
+
     /// What can be told is no less found for what cannot: here the late answer is of the one length that is owed.
     #[test]
     fn an_answer_later_than_its_window_to_a_read_that_can_differ_is_found_where_nobody_fears_it() {

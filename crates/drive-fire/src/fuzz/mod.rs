@@ -60,11 +60,13 @@ pub enum Target {
     FarEnd,
     /// Whoever looks after a drive, by what the drive replies.
     Supervisor,
+    /// Several hands at the drives of one line.
+    Hands,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Rtu,
         Self::Ascii,
         Self::Mbap,
@@ -80,6 +82,7 @@ impl Target {
         Self::Schedule,
         Self::FarEnd,
         Self::Supervisor,
+        Self::Hands,
     ];
 
     /// The one of this name.
@@ -135,6 +138,7 @@ impl Target {
             Self::Schedule => orders::schedule(&mut rng),
             Self::FarEnd => orders::far_end(&mut rng),
             Self::Supervisor => supervisor::execute(rng),
+            Self::Hands => supervisor::execute_hands(rng),
         });
         panic::catch_unwind(run).unwrap_or_else(|panic| {
             let said = panic.downcast_ref::<String>().cloned();
@@ -225,17 +229,19 @@ pub fn find_plants(seed: u64, at_most: u64) -> Told {
 pub fn find_plants_by_orders(seed: u64, at_most: u64, only: Option<Target>) -> Vec<Told> {
     let lines = || drive_bus::mutants::ALL.iter().map(|mutant| mutant.name).collect();
     let fleet = || crate::mutation::names_of("drive-fleet").collect();
-    let of_each: [(Target, &'static str, Vec<&'static str>); 3] = [
+    let of_each: [(Target, &'static str, Vec<&'static str>); 4] = [
         (Target::Schedule, "fuzzing by orders of a line, against planted defects", lines()),
         (Target::FarEnd, "fuzzing by orders of a gateway's line, against planted defects", lines()),
         (Target::Supervisor, "fuzzing by lives of a drive, against planted defects", fleet()),
+        (Target::Hands, "fuzzing by several hands, against planted defects", fleet()),
     ];
     let wanted = of_each.into_iter().filter(|(target, ..)| only.is_none_or(|only| only == *target));
     wanted.map(|(target, part, names)| find_plants_of(target, part, &names, seed, at_most)).collect()
 }
 
+/// The same of these wrong lines alone.
 #[cfg(feature = "plants")]
-fn find_plants_of(
+pub fn find_plants_of(
     target: Target,
     part: &'static str,
     names: &[&'static str],

@@ -2,6 +2,7 @@
 //! numbers have it, that trips, is taken by others and is exchanged for another one, while it is commanded. What it has done, and what it
 //! told, is held against what the fleet does and says.
 
+mod hands;
 mod puppet;
 mod truth;
 
@@ -17,8 +18,9 @@ use drive_sim::{SimLine, Wiring};
 use tokio::time::{Instant, sleep};
 
 use super::source::Source;
+pub(super) use hands::execute as execute_hands;
 use puppet::Puppet;
-use truth::{LIMIT, Truth};
+use truth::{Given, LIMIT, Truth};
 
 /// Everything is told by then.
 const LONGEST: Duration = Duration::from_secs(240);
@@ -54,11 +56,10 @@ async fn live(mut source: Source) -> Result<(), String> {
     };
     let serial = SerialSettings::MODBUS_DEFAULT;
     let line = Line::over(SimLine::new(Wiring::rtu(serial)).in_memory(), LineConfig::stream(serial));
-    let puppet = Puppet::new(Arc::clone(&truth));
     let fleet = Fleet::builder()
         .whatever_the_plan()
         .line("line", line)
-        .drive("line", 1, settings, |_, _| Box::new(puppet))
+        .drive("line", 1, settings, |_, slave| Box::new(Puppet::new(Arc::clone(&truth), slave)))
         .start()
         .map_err(|error| error.to_string())?;
     let drive = fleet.drives()[0].clone();
@@ -119,7 +120,7 @@ fn tell(
     finished: impl Future<Output = Outcome> + Send + 'static,
 ) {
     let (given, truth) = (Instant::now(), Arc::clone(truth));
-    locked(&truth).given(ordered, given);
+    locked(&truth).given(Given { ordered, at: given, by: "owner", setpoint: None, of_group: false });
     drop(tokio::spawn(async move {
         let outcome = finished.await;
         locked(&truth).told(ordered, given, &outcome);

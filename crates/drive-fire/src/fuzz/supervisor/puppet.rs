@@ -25,12 +25,13 @@ const RUN: u16 = 15;
 /// The drive.
 pub(super) struct Puppet {
     truth: Arc<Mutex<Truth>>,
+    slave: SlaveAddress,
     lifetimes: Lifetimes,
 }
 
 impl Puppet {
-    pub(super) fn new(truth: Arc<Mutex<Truth>>) -> Self {
-        Self { truth, lifetimes: Lifetimes::default() }
+    pub(super) fn new(truth: Arc<Mutex<Truth>>, slave: SlaveAddress) -> Self {
+        Self { truth, slave, lifetimes: Lifetimes::default() }
     }
 
     /// Each exchange has its time.
@@ -76,7 +77,7 @@ impl Puppet {
 #[async_trait]
 impl Drive for Puppet {
     fn slave(&self) -> SlaveAddress {
-        slave()
+        self.slave
     }
 
     fn capabilities(&self) -> &'static Capabilities {
@@ -93,7 +94,10 @@ impl Drive for Puppet {
         locked(&self.truth).lease
     }
 
-    fn adopt(&mut self, _: Lease) {}
+    fn adopt(&mut self, lease: Lease) {
+        let mut truth = locked(&self.truth);
+        truth.lease = Some(lease).filter(|_| truth.runs());
+    }
 
     async fn status(&mut self) -> Result<Status> {
         self.passes().await;
@@ -127,6 +131,7 @@ impl Drive for Puppet {
         let command = Command::Start(direction);
         let written = self.write(command, |truth| {
             truth.note("started");
+            truth.run_is_written(direction);
             truth.carried.push(Instant::now());
             truth.run = Some((direction, Instant::now())).filter(|_| !truth.tripped);
             truth.stopped_at = None;

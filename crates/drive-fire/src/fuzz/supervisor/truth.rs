@@ -21,6 +21,32 @@ const EXCHANGED: Duration = Duration::from_secs(6);
 /// From a stop that was taken to standstill.
 const RAMP: Duration = Duration::from_secs(2);
 
+/// From when a start is given on nothing of it is written behind this: the second that it may wait, the two that it may take behind that,
+/// and a write that was under way.
+const LONGEST_START: Duration = Duration::from_millis(3_400);
+
+/// Something that was ordered, and is not told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Given {
+    pub(super) ordered: Ordered,
+    pub(super) at: Instant,
+    /// Who has ordered it.
+    pub(super) by: &'static str,
+    /// What a start brings along.
+    pub(super) setpoint: Option<Frequency>,
+    /// It was ordered of several: it has its turn when it has.
+    pub(super) of_group: bool,
+}
+
+/// What its owner allows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rule {
+    /// Who alone may command it; `None`: whoever does.
+    pub(super) nobody_but: Option<&'static str>,
+    /// The most that it may turn at.
+    pub(super) limit: Frequency,
+}
+
 /// What is true, and what follows from it.
 pub(super) struct Truth {
     pub(super) source: Source,
@@ -36,6 +62,8 @@ pub(super) struct Truth {
     /// No reading is answered until then.
     mute_until: Option<Instant>,
     pub(super) reference: Frequency,
+    /// When another master has written it.
+    foreign: Option<Instant>,
     pub(super) lease: Option<Lease>,
     /// The last status that it told, and the last that told a run command in force, and which way.
     told_status: Option<(Instant, bool)>,
@@ -47,7 +75,12 @@ pub(super) struct Truth {
     given_start: Option<Instant>,
     given_stop: Option<Instant>,
     given_setpoint: Option<Instant>,
-    pending: Vec<(Ordered, Instant)>,
+    pub(super) pending: Vec<Given>,
+    /// What its owner allows, since when, and whether it stood then: what turns goes on.
+    pub(super) rule: Rule,
+    ruled: Option<(Instant, bool)>,
+    /// Since when it is being taken out, or all end.
+    pub(super) leaving: Option<Instant>,
     /// From when to when each start was on its way that was confirmed.
     confirmed: Vec<(Instant, Instant)>,
     /// When each start was given, and told.
@@ -56,7 +89,7 @@ pub(super) struct Truth {
     pub(super) carried: Vec<Instant>,
     pub(super) resets_ordered: u32,
     pub(super) resets: u32,
-    pub(super) against: Option<&'static str>,
+    pub(super) against: Option<String>,
     /// What happened, for whoever reads of a find.
     pub(super) story: Vec<String>,
 }
@@ -92,6 +125,7 @@ impl Truth {
             is_another: false,
             mute_until: None,
             reference: Frequency::from_hertz(30),
+            foreign: None,
             lease: None,
             told_status: None,
             told_in_force: None,
@@ -101,6 +135,9 @@ impl Truth {
             given_stop: None,
             given_setpoint: None,
             pending: Vec::new(),
+            rule: Rule { nobody_but: None, limit: LIMIT },
+            ruled: None,
+            leaving: None,
             confirmed: Vec::new(),
             starts: Vec::new(),
             carried: Vec::new(),
@@ -111,8 +148,8 @@ impl Truth {
         }
     }
 
-    pub(super) fn object(&mut self, what: &'static str) {
-        self.against.get_or_insert(what);
+    pub(super) fn object(&mut self, what: &str) {
+        self.against.get_or_insert_with(|| what.to_owned());
     }
 
     pub(super) fn note(&mut self, what: impl Into<String>) {
@@ -145,6 +182,11 @@ impl Truth {
             12 => {
                 let time = Duration::from_millis(self.source.u16(..).into()) / 4;
                 self.mute_until = Some(Instant::now() + time);
+            }
+            // Another master writes its reference.
+            14 => {
+                self.reference = Frequency::from_hertz(self.source.u16(10..50));
+                self.foreign = Some(Instant::now());
             }
             _ => {}
         }
@@ -238,9 +280,17 @@ impl Truth {
         Error::NotConfirmed { slave: slave(), command, status: Box::new(self.status()), because: None }
     }
 
-    pub(super) fn given(&mut self, ordered: Ordered, at: Instant) {
-        self.note(format!("{ordered:?}"));
-        self.pending.push((ordered, at));
+    /// Its owner says otherwise.
+    pub(super) fn ruled(&mut self, rule: Rule) {
+        self.note(format!("{rule:?}"));
+        self.ruled = Some((Instant::now(), !self.runs() && !self.turns()));
+        self.rule = rule;
+    }
+
+    pub(super) fn given(&mut self, given: Given) {
+        let Given { ordered, at, .. } = given;
+        self.note(format!("{ordered:?} by {}{}", given.by, if given.of_group { " of several" } else { "" }));
+        self.pending.push(given);
         match ordered {
             Ordered::Start(_) => {
                 self.given_start = Some(at);
@@ -260,7 +310,7 @@ impl Truth {
         if !self.control {
             self.object("what is only watched is started");
         }
-        if !self.pending.iter().any(|(ordered, _)| matches!(ordered, Ordered::Start(_))) {
+        if !self.pending.iter().any(|given| matches!(given.ordered, Ordered::Start(_))) {
             self.object("it is started, and nobody waits for that");
         }
         if self.given_stop.is_some_and(|stop| stop < now && self.given_start.is_none_or(|start| start < stop))
@@ -278,11 +328,63 @@ impl Truth {
         }
     }
 
+    /// A run command is on the wire: of those who wait for a start this way one has to be there whose it can be.
+    pub(super) fn run_is_written(&mut self, direction: Direction) {
+        let now = Instant::now();
+        let is_leaving = self.leaving.is_some_and(|since| since < now);
+        // What was on the wire as its owner changed his mind was before that.
+        let holds = self.ruled.is_some_and(|(since, stood)| since < now && stood);
+        let Rule { nobody_but, limit } = self.rule;
+        let newest = self.confirmed.iter().map(|(given, _)| *given).max();
+        let asked_since = |at: Instant| self.given_setpoint.max(self.foreign).is_some_and(|since| since > at);
+        // That is seen behind the run command.
+        let is_foreign = self.foreign.is_some_and(|at| at + LONGEST_START > now);
+        let wrong = |given: &Given| {
+            if self.given_stop.is_some_and(|stop| given.at < stop && stop < now) {
+                Some("behind a stop that was given since")
+            } else if holds && nobody_but.is_some_and(|one| one != given.by) {
+                Some("for somebody who may not command it any more")
+            } else if !given.of_group && now > given.at + LONGEST_START {
+                Some("late")
+            } else if newest.is_some_and(|newest| newest > given.at) {
+                Some("behind one that was given since, and confirmed")
+            } else if given.setpoint.is_some_and(|asked| asked != self.reference) && !asked_since(given.at) {
+                Some("at another setpoint than it was asked for")
+            } else {
+                None
+            }
+        };
+        let starts = self.pending.iter().filter(|given| given.ordered == Ordered::Start(direction));
+        let wrong: Vec<_> = starts.map(wrong).collect();
+        let object = match wrong.first() {
+            _ if is_leaving => Some("behind the end of its fleet, or its own"),
+            _ if holds && !is_foreign && self.reference > limit => {
+                Some("at a setpoint that its owner forbids by now")
+            }
+            None => Some("and nobody waits for that this way"),
+            Some(first) if wrong.iter().all(Option::is_some) => *first,
+            Some(_) => None,
+        };
+        if let Some(object) = object {
+            self.against.get_or_insert(format!("it is started {object}"));
+        }
+    }
+
+    /// Nobody waits any more for what was ordered then.
+    pub(super) fn is_dropped(&mut self, ordered: Ordered, given: Instant) {
+        self.note(format!("{ordered:?} is dropped"));
+        self.pending.retain(|pending| (pending.ordered, pending.at) != (ordered, given));
+    }
+
     pub(super) fn told(&mut self, ordered: Ordered, given: Instant, outcome: &Outcome) {
         let now = Instant::now();
         self.note(format!("{ordered:?} is told: {}", outcome.word()));
-        if let Some(at) = self.pending.iter().position(|pending| *pending == (ordered, given)) {
-            self.pending.remove(at);
+        let is_it = |pending: &Given| (pending.ordered, pending.at) == (ordered, given);
+        if let Some(at) = self.pending.iter().position(is_it) {
+            let asked = self.pending.remove(at).setpoint.filter(|_| self.given_setpoint == Some(given));
+            if asked.is_some_and(|asked| asked != self.reference) && outcome.is_confirmed() && self.runs() {
+                self.object("a start is confirmed at another reference than it was given");
+            }
         }
         if let Ordered::Start(_) = ordered {
             self.start_is_told(given, now, outcome);

@@ -405,7 +405,7 @@ fn a_start_whose_driver_reads_for_it_is_broken_off_by_settings_that_refuse_it_an
     let mut rig = Rig::ready();
     rig.order(run_at(22));
     rig.pass(2_000 * MS);
-    assert!(!rig.machine.handle_settings(rig.now, &limited) && !rig.machine.stopping.is_some());
+    assert!(!rig.machine.handle_settings(rig.now, &limited) && rig.machine.stopping.is_none());
 }
 
 #[test]
