@@ -78,7 +78,9 @@ fn why_a_drive_refuses_and_what_to_do_stands_in_french_on_the_page() {
             }
         }
     }
-    for source in sources(format!("{root}drive-profile/src/drive").as_ref()) {
+    let of_the_fleet = read("drive-fleet/src/supervisor/shown.rs");
+    let of_profiles = sources(format!("{root}drive-profile/src/drive").as_ref());
+    for source in of_profiles.into_iter().chain([of_the_fleet]) {
         // What stands over two lines is one sentence.
         let source = source.replace("\\\n     ", "");
         for before in ["by: \"", "remedy: \"", "Refusal::Settings(", "Refusal::OnlyAStartShows("] {

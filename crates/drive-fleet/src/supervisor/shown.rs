@@ -48,8 +48,8 @@ impl Reply {
 /// one, or the drive have lost its supply and with it the setpoint.
 pub(super) fn follows_another(asked: Option<Setpoint>, status: &Status) -> Option<Refusal> {
     const ANOTHER: Refusal = Refusal::Overridden {
-        by: "another reference than the start was given with, of another master or behind a power cut,",
-        remedy: "see who writes it, and start again with the setpoint",
+        by: "another setpoint than was given",
+        remedy: "see who else writes to this drive, and that its reference is that of the bus",
     };
     let Some((Setpoint::Frequency(asked), follows)) = asked.zip(status.reference) else { return None };
     let is_another = follows.centihertz().abs_diff(asked.centihertz()) > NEAR.centihertz();
