@@ -86,6 +86,9 @@ impl Supervisor {
         self.silent_since = self.silent_since.max(status.at);
         self.status = Some(status.clone());
         self.last_error = None;
+        if let Some(active) = &mut self.active {
+            active.is_seen();
+        }
         self.retraction.status(now);
         self.changed = true;
         if was != Link::Connected {

@@ -69,7 +69,7 @@ impl Supervisor {
     fn setpoint_given(&mut self, now: Instant, setpoint: Setpoint) {
         self.given = Some(Given { setpoint, at: now });
         let Some(active) = &mut self.active else { return };
-        active.setpoint_given = Some(setpoint);
+        active.set_given(setpoint);
         match active.order {
             Order::Setpoint { until: Until::InForce, .. } => self.end_order(Outcome::Confirmed),
             Order::Setpoint { .. } => self.await_reference(now, Outcome::Confirmed),
@@ -78,7 +78,7 @@ impl Supervisor {
     }
 
     /// It is in force, as told, and on its way to the reference.
-    fn await_reference(&mut self, now: Instant, in_force: Outcome) {
+    pub(super) fn await_reference(&mut self, now: Instant, in_force: Outcome) {
         let until = now + self.settings.times.reference;
         self.set_phase(Phase::Awaiting { since: now, until });
         let asker = self.active.as_ref().and_then(|active| active.asker.id());

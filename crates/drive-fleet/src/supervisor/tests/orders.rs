@@ -196,7 +196,11 @@ fn given_behind_forty_hertz(runs: bool, answered_after: Duration) -> (Rig, CallI
     }
     rig.drive.log.clear();
     let (asker, expires) = (rig.asker(), Expiry::at(rig.now + 1_000 * MS));
-    rig.machine.handle_order(rig.now, asker, run_at(10), None, Some(expires));
+    let ten = Some(Frequency::from_hertz(10).into());
+    // One that runs this way gets no run word.
+    let direction = if runs { Direction::Reverse } else { Direction::Forward };
+    let start = Order::Start { direction, setpoint: ten, until: Until::AtReference };
+    rig.machine.handle_order(rig.now, asker, start, None, Some(expires));
     let id = CallId(rig.next_call);
     let step = rig.next();
     let Step::Do { job: job @ Job::SetSetpoint(..), .. } = step else { panic!("{step:?}") };
@@ -451,6 +455,39 @@ fn a_start_whose_run_word_waits_too_long_for_the_line_behind_its_setpoint_is_tol
     assert_eq!(not_started(rig.outcome(id)), Some((ten, None)), "{:?}", rig.outcome(id));
 }
 
+/// As at the STOP key of its panel, between the setpoint of a start and its run word.
+#[test]
+fn a_motor_that_somebody_stops_behind_a_start_is_not_started_again_by_it_and_one_that_runs_this_way_gets_no_run_word()
+ {
+    for (direction, is_stopped) in [
+        (Direction::Forward, false),
+        (Direction::Forward, true),
+        (Direction::Reverse, false),
+        (Direction::Reverse, true),
+    ] {
+        let mut rig = Rig::running_at(25);
+        rig.drive.log.clear();
+        let setpoint = Some(Frequency::from_hertz(30).into());
+        let start = rig.order(Order::Start { direction, setpoint, until: Until::InForce });
+        let Step::Do { job: job @ Job::SetSetpoint(..), .. } = rig.next() else { panic!() };
+        let reply = rig.drive.answer(job);
+        if is_stopped {
+            rig.drive.stand();
+        }
+        rig.machine.handle_reply(rig.now, reply);
+        rig.pass(1_000 * MS);
+        let starts = rig.drive.log.iter().filter(|job| matches!(job, Job::Start(_))).count();
+        assert_eq!(
+            starts,
+            usize::from(!is_stopped && direction == Direction::Reverse),
+            "{:?}",
+            rig.drive.log
+        );
+        let outcome = rig.outcome(start).cloned();
+        assert_eq!(outcome.as_ref().is_some_and(Outcome::is_confirmed), !is_stopped, "{outcome:?}");
+    }
+}
+
 /// `Refused`: "It was refused; nothing moved because of it."
 #[test]
 fn a_start_that_the_drive_refuses_behind_its_setpoint_is_refused_where_its_motor_stands_and_nowhere_else() {
@@ -512,9 +549,17 @@ fn a_lost_start_the_other_way_is_not_confirmed_by_the_run_command_that_stands() 
     let mut rig = Rig::running_at(25);
     // No setpoint goes before its run word.
     rig.machine.handle_changed(rig.now, drive_core::Ground::Units);
-    rig.drive.loses_answer = true;
     rig.drive.obeys = false;
     let id = rig.order(Order::Start { direction: Direction::Reverse, setpoint: None, until: Until::InForce });
+    loop {
+        let Step::Do { job, .. } = rig.next() else { panic!() };
+        rig.drive.loses_answer = matches!(job, Job::Start(_));
+        let reply = rig.drive.answer(job);
+        rig.machine.handle_reply(rig.now, reply);
+        if matches!(job, Job::Start(_)) {
+            break;
+        }
+    }
     rig.pass(8_000 * MS);
     assert!(matches!(rig.outcome(id), Some(Outcome::NotConfirmed(_))), "{:?}", rig.outcome(id));
 }
