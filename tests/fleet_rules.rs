@@ -81,20 +81,52 @@ async fn rule_1_a_drive_whose_settings_have_no_ramp_stop_is_stopped_by_another()
     assert!(!plant.machine().observe().running);
 }
 
-/// Between the setpoint of a start, which was read back, and its run word another master writes its own (`LFr`; FA01h; 0002h).
+/// Another master writes its reference behind that of a setpoint, before it is read back.
+#[tokio::test(start_paused = true)]
+async fn rule_3_a_motor_that_follows_another_masters_reference_behind_a_setpoint_is_told_and_not_left_to_it()
+{
+    each(async |family| {
+        let (register, word) = reference_of_40_hz(family);
+        let mut plant = Plant::single(family, |_| {});
+        plant.run_at(30).await;
+        let machine = plant.machine().clone();
+        let before = writes(&machine);
+        let other = tokio::spawn(async move {
+            machine.wait_until(|_| writes(&machine) > before).await;
+            // Its answer is on its way.
+            sleep(Duration::from_millis(8)).await;
+            machine.written_by_another(register, word)
+        });
+        // Some have read it back by then.
+        drop(plant.motor().set_setpoint(Frequency::from_hertz(20)).await);
+        other.await.expect("it is written").expect("another master may");
+        plant.event("who gives the reference", |kind| matches!(kind, EventKind::ReferenceTaken(_))).await;
+    })
+    .await;
+}
+
+/// `LFr`; FA01h; 0002h.
+fn reference_of_40_hz(family: Family) -> (u16, u16) {
+    match drives::five(family) {
+        Five::Atv21 => (0xFA01, 4_000),
+        Five::Atv28 | Five::Atv58 => (401, 400),
+        Five::Atv312 => (8_502, 400),
+        Five::Omron3g3ev => (0x0002, 400),
+    }
+}
+
+fn writes(machine: &SimSlave) -> u64 {
+    machine.requests(0x06) + machine.requests(0x10)
+}
+
+/// Between the setpoint of a start, which was read back, and its run word another master writes its own.
 #[tokio::test(start_paused = true)]
 async fn rule_3_a_start_at_another_masters_reference_is_not_confirmed_and_its_motor_is_brought_to_rest() {
     each(async |family| {
-        let (register, word) = match drives::five(family) {
-            Five::Atv21 => (0xFA01, 4_000),
-            Five::Atv28 | Five::Atv58 => (401, 400),
-            Five::Atv312 => (8_502, 400),
-            Five::Omron3g3ev => (0x0002, 400),
-        };
+        let (register, word) = reference_of_40_hz(family);
         let plant = Plant::single(family, |_| {});
         plant.motor().ready(60 * SECOND).await.expect("it gets ready");
         let machine = plant.machine().clone();
-        let writes = |machine: &SimSlave| machine.requests(0x06) + machine.requests(0x10);
         let before = writes(&machine);
         let other = tokio::spawn(async move {
             machine.wait_until(|_| writes(&machine) > before + 1).await;

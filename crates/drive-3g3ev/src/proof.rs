@@ -61,6 +61,11 @@ impl Proof {
         (self.agreed, self.reference) = (Some(reference), Some(reference));
     }
 
+    /// A reference that this side has written, and in whose place another one was read: it is looked at at once, and is not taken for ours.
+    pub(crate) const fn expect(&mut self, reference: u16) {
+        (self.agreed, self.urgent) = (Some(reference), true);
+    }
+
     /// Nothing is known of the reference any more.
     pub(crate) const fn disagree(&mut self) {
         (self.agreed, self.reference) = (None, None);

@@ -63,13 +63,14 @@ impl<P: Port> Drive3g3ev<P> {
     /// by 21h, or keeps another value, and the reading back tells.
     async fn write_reference(&mut self, word: u16, order: Order) -> Result<()> {
         let mut calls = self.registers.at(Class::Command).replacing(REFERENCE.address());
+        let before = self.proof.agreed();
         self.proof.disagree();
         calls.write(REFERENCE, word).await?;
         self.registers.owe_judgement();
-        self.see_reference(word, order).await.map_err(Error::after_write)
+        self.see_reference(word, before, order).await.map_err(Error::after_write)
     }
 
-    async fn see_reference(&mut self, word: u16, order: Order) -> Result<()> {
+    async fn see_reference(&mut self, word: u16, before: Option<u16>, order: Order) -> Result<()> {
         let (mut confirming, settled) = (Confirming::begin(), Instant::now() + SETTLED_WITHIN);
         loop {
             let (kept, status, because) = match self.look_at_reference(word).await {
@@ -83,6 +84,10 @@ impl<P: Port> Drive3g3ev<P> {
                 return Ok(());
             }
             if !kept || Instant::now() >= settled || !confirming.again().await {
+                let held = status.raw(REFERENCE.address());
+                if !kept && held.is_some() && held != before {
+                    self.proof.expect(word);
+                }
                 return Err(self.not_confirmed(order, status, because.filter(|_| kept)));
             }
         }

@@ -103,6 +103,11 @@ impl Proof {
         (self.source, self.approach) = (Some(ReferenceSource::Serial), Approach::default());
     }
 
+    /// A reference that this side has written, and in whose place another one was read: it is looked at at once, and is not taken for ours.
+    pub(crate) const fn expect(&mut self, reference: Reference) {
+        (self.agreed, self.urgent) = (Some(reference), 2);
+    }
+
     /// Nothing is known of the reference any more.
     pub(crate) fn disagree(&mut self) {
         (self.agreed, self.reference, self.approach) = (None, None, Approach::default());

@@ -26,13 +26,23 @@ impl<P: Port> Atv21<P> {
         self.check_own(Command::Setpoint(setpoint)).await?;
         let reference @ (register, word) = self.reference(setpoint).await?;
         self.check_reference(Command::Setpoint(setpoint)).await?;
+        let before = self.proof.agreed;
         let has_cleared = self.clear_other_reference(register).await?;
         let mut calls = self.registers.at(Class::Command).replacing(register.address());
         let written = calls.write(register, word).await;
         // A motor that followed the other one comes down by that.
         written.map_err(|error| if has_cleared { error.after_write() } else { error })?;
         self.registers.owe_judgement();
-        self.confirm_reference(setpoint, reference).await.map_err(Error::after_write)
+        let seen = self.confirm_reference(setpoint, reference).await.map_err(Error::after_write);
+        if seen.as_ref().is_err_and(|error| error.kind() == ErrorKind::NotConfirmed) {
+            let held = self.registers.at(Class::Command).read(register).await.ok();
+            let was =
+                before.filter(|(before, _)| before.address() == register.address()).map(|(_, word)| word);
+            if held.is_some_and(|held| held != word && was != Some(held)) {
+                self.proof.expect(reference);
+            }
+        }
+        seen
     }
 
     /// Sets the reference to 0 that is not to count: the manual does not say which of FA01 and FA13 does where both are

@@ -169,7 +169,12 @@ impl Supervisor {
             Phase::Prepare | Phase::Sending(_) | Phase::Verifying { job: Job::SetSetpoint(..), .. } => {}
             Phase::Awaiting { since, .. } => {
                 let after = now.saturating_duration_since(*since);
-                if has_reached(given, &status) {
+                // One that another master has turned round is at its reference too.
+                let directed = match active.order {
+                    Order::Start { direction, .. } => status.direction.is_none_or(|turns| turns == direction),
+                    _ => true,
+                };
+                if directed && has_reached(given, &status) {
                     let done = active.order.done(Some(&status));
                     self.end_order(done);
                 } else if let Some(because) = status.verdict.and_then(|verdict| verdict.because()) {

@@ -455,6 +455,31 @@ fn a_start_whose_run_word_waits_too_long_for_the_line_behind_its_setpoint_is_tol
     assert_eq!(not_started(rig.outcome(id)), Some((ten, None)), "{:?}", rig.outcome(id));
 }
 
+/// As by another master's run command amid its ramp.
+#[test]
+fn a_start_until_its_reference_is_not_confirmed_by_a_motor_that_turns_the_other_way_at_it() {
+    for turns in [Direction::Forward, Direction::Reverse] {
+        let mut rig = Rig::ready();
+        let start = rig.order(run_at(25));
+        loop {
+            let Step::Do { job, .. } = rig.next() else { panic!() };
+            let mut reply = rig.drive.answer(job);
+            if let Reply::Ordered(Ok(status)) = &mut reply {
+                // It is on its way there.
+                status.at_reference = Some(false);
+                rig.drive.status.direction = Some(turns);
+                rig.machine.handle_lease(rig.drive.lease);
+                rig.machine.handle_reply(rig.now, reply);
+                break;
+            }
+            rig.machine.handle_reply(rig.now, reply);
+        }
+        rig.pass(2_000 * MS);
+        let is_confirmed = rig.outcome(start).is_some_and(Outcome::is_confirmed);
+        assert_eq!(is_confirmed, turns == Direction::Forward, "{:?}", rig.outcome(start));
+    }
+}
+
 /// As at the STOP key of its panel, between the setpoint of a start and its run word.
 #[test]
 fn a_motor_that_somebody_stops_behind_a_start_is_not_started_again_by_it_and_one_that_runs_this_way_gets_no_run_word()
