@@ -291,8 +291,9 @@ impl DriveHandle {
         self.order(Order::Start { direction, setpoint: None, until: Until::InForce })
     }
 
-    /// Gives a setpoint and starts the motor. Confirmed when the run command shows in its words: the speed is then on its
-    /// way, and [`run`](Self::run) waits until it is reached.
+    /// Gives a setpoint and starts the motor. Confirmed when the run command shows in its words, at that setpoint: the speed is then on its
+    /// way, and [`run`](Self::run) waits until it is reached. A motor that runs this way already gets the setpoint alone, and one that ran and
+    /// that somebody has stopped since this was asked is not started.
     pub fn start_at(&self, direction: Direction, setpoint: impl Into<Setpoint>) -> Ticket {
         let setpoint = Some(setpoint.into());
         self.order(Order::Start { direction, setpoint, until: Until::InForce })
