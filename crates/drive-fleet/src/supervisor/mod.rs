@@ -21,6 +21,7 @@ mod orders;
 mod pace;
 mod permission;
 mod questions;
+mod ran;
 mod replies;
 mod retraction;
 mod shown;

@@ -2,17 +2,13 @@
 
 use std::collections::VecDeque;
 
-use drive_core::{Direction, Error, Setpoint, Status, StopMode, Verdict};
+use drive_core::{Error, Setpoint, StopMode};
 use tokio::time::Instant;
 
-use super::{
-    Asker, CallId, Expiry, Job, Leave, Lifetime, Supervisor, Turn, permission::Blocked,
-    shown::follows_another,
-};
+use super::{Asker, CallId, Expiry, Job, Leave, Lifetime, Supervisor, Turn, permission::Blocked, ran::Look};
 use crate::{
     cause::{Cause, Policy},
-    outcome::{Order, Outcome, Refused, Unconfirmed, Until},
-    snapshot::Timed,
+    outcome::{Order, Outcome, Refused, Unconfirmed},
 };
 
 /// An order that waits.
@@ -44,33 +40,12 @@ pub(super) struct Active {
     /// Why it could not be sent yet.
     blocked: Option<Refused>,
     /// How a motor that ran when it was given was looked at since; `None`: it stood.
-    ran: Option<Look>,
+    pub(super) ran: Option<Look>,
     /// Whether it has the turn at which the drives of its line start.
     turn: Turn,
     /// It has waited for that, and not for a line on which nothing goes on.
     stood_in_row: bool,
     pub(super) phase: Phase,
-}
-
-/// Whether a status was taken since.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Look {
-    Wanted,
-    Taken,
-    /// What the ordinary one does not tell, as the command word of some drives, is read again.
-    WantedAnew,
-    TakenAnew,
-}
-
-/// What became of a motor that ran when its start was given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum RunsOn {
-    /// It runs as it is to.
-    ThisWay,
-    /// It runs, and is to be told how.
-    OtherWay,
-    /// Somebody has stopped it.
-    Ended,
 }
 
 #[derive(Debug)]
@@ -113,10 +88,7 @@ impl Active {
 
     /// Its drive has told its status.
     pub(super) fn is_seen(&mut self) {
-        self.ran = self.ran.map(|look| match look {
-            Look::Wanted | Look::Taken => Look::Taken,
-            Look::WantedAnew | Look::TakenAnew => Look::TakenAnew,
-        });
+        self.ran = self.ran.map(Look::taken);
     }
 
     pub(super) const fn is_start(&self) -> bool {
@@ -411,31 +383,8 @@ impl Supervisor {
                 Ok(Some(Job::Start(direction)))
                     if self.active.as_ref().is_some_and(|active| active.ran.is_some()) =>
                 {
-                    match self.runs_on(direction) {
-                        None => {
-                            let anew = self
-                                .active
-                                .as_ref()
-                                .is_some_and(|active| active.ran == Some(Look::WantedAnew));
-                            return Some((Job::Status { anew }, Some(expires)));
-                        }
-                        Some(RunsOn::Ended) => self.end_unsent(now, Outcome::Refused(Refused::Stopped)),
-                        Some(RunsOn::OtherWay) => {
-                            if let Some(active) = &mut self.active {
-                                active.ran = None;
-                            }
-                        }
-                        Some(RunsOn::ThisWay) => {
-                            self.is_started_by_active();
-                            let status = self.status.as_ref().map(|status| status.value.clone());
-                            let done = order.done(status.as_deref());
-                            match order {
-                                Order::Start { until: Until::AtReference, .. } => {
-                                    self.await_reference(now, done)
-                                }
-                                _ => self.end_order(done),
-                            }
-                        }
+                    if let Some(look) = self.start_of_a_running_motor(now, order, direction) {
+                        return Some((look, Some(expires)));
                     }
                 }
                 Ok(Some(_)) if self.waits_for_turn() => return None,
@@ -471,47 +420,10 @@ impl Supervisor {
         }
     }
 
-    fn is_started_by_active(&mut self) {
+    pub(super) fn is_started_by_active(&mut self) {
         self.started_by = self.active.as_ref().and_then(|active| active.asker.id());
         // What is started anew is not to be withdrawn any more.
         self.withdrawal = None;
-    }
-
-    /// Whether the motor is driven by the run command of this side, as far as the last status tells.
-    fn runs_by_this_side(&self) -> bool {
-        let runs = |status: &Timed<Status>| {
-            let is_in_force = matches!(status.value.verdict, Some(Verdict::InForce | Verdict::NotKnown));
-            is_in_force && !status.value.is_undriven()
-        };
-        self.lease.is_some() && self.status.as_ref().is_some_and(runs)
-    }
-
-    /// What a motor does that ran when its start was given, by a status since; `None`: there is none yet that tells. One that somebody has
-    /// stopped meanwhile is not started against that will, and to one that runs this way nothing is to be written.
-    fn runs_on(&mut self, direction: Direction) -> Option<RunsOn> {
-        let (starts_at, lease) = (self.starts_at(), self.lease);
-        let look = self.active.as_mut()?.ran.as_mut()?;
-        let status = &self.status.as_ref()?.value;
-        match (*look, status.verdict) {
-            (Look::Wanted | Look::WantedAnew, _) => return None,
-            (Look::Taken, Some(Verdict::NotKnown)) if !status.is_undriven() => {
-                *look = Look::WantedAnew;
-                return None;
-            }
-            _ => {}
-        }
-        Some(match (status.verdict, lease) {
-            (Some(Verdict::InForce), Some(lease)) if lease.direction == direction => {
-                match follows_another(starts_at, status) {
-                    None => RunsOn::ThisWay,
-                    // Its driver sees why.
-                    Some(_) => RunsOn::OtherWay,
-                }
-            }
-            (None | Some(Verdict::NotInForce { .. }), _) => RunsOn::Ended,
-            (Some(Verdict::NotKnown), _) if status.is_undriven() => RunsOn::Ended,
-            _ => RunsOn::OtherWay,
-        })
     }
 
     /// Whether the order is a start whose turn among those of its line has not come; it wants it from now on.

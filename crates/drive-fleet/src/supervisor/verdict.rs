@@ -77,8 +77,16 @@ impl Supervisor {
         }
     }
 
+    /// It is in force, and that is all, unless it is to come to its reference.
+    pub(super) fn is_in_force(&mut self, now: Instant, order: Order, done: Outcome) {
+        match order {
+            Order::Start { until: Until::AtReference, .. } => self.await_reference(now, done),
+            _ => self.end_order(done),
+        }
+    }
+
     /// It is in force, as told, and on its way to the reference.
-    pub(super) fn await_reference(&mut self, now: Instant, in_force: Outcome) {
+    fn await_reference(&mut self, now: Instant, in_force: Outcome) {
         let until = now + self.settings.times.reference;
         self.set_phase(Phase::Awaiting { since: now, until });
         let asker = self.active.as_ref().and_then(|active| active.asker.id());
@@ -120,10 +128,7 @@ impl Supervisor {
         match result {
             Ok(status) => {
                 let done = order.done(status.as_ref());
-                match order {
-                    Order::Start { until: Until::AtReference, .. } => self.await_reference(now, done),
-                    _ => self.end_order(done),
-                }
+                self.is_in_force(now, order, done);
                 if let Some(status) = status {
                     self.accept_status(now, status);
                 }
@@ -225,11 +230,8 @@ impl Supervisor {
         };
         match crate::mutant!("lost-start-believed", verdict, Some(Verdict::InForce)) {
             Some(Verdict::InForce) => {
-                let done = active.order.done(Some(status));
-                match active.order {
-                    Order::Start { until: Until::AtReference, .. } => self.await_reference(now, done),
-                    _ => self.end_order(done),
-                }
+                let order = active.order;
+                self.is_in_force(now, order, order.done(Some(status)));
             }
             // A drive may take a while to show a word that it holds.
             Some(Verdict::NotInForce { because, .. }) if after >= SETTLED_WITHIN => {
