@@ -30,16 +30,15 @@ impl Reply {
         asked: Option<Setpoint>,
         result: Result<Status>,
     ) -> Self {
-        Self::Ordered(result.and_then(|status| match status.verdict {
-            Some(Verdict::NotInForce { because, .. }) => {
-                Err(not_shown(slave, Command::Start(direction), status, Some(because)))
+        Self::Ordered(result.and_then(|status| {
+            let because = match status.verdict {
+                Some(Verdict::NotInForce { because, .. }) => Some(because),
+                _ => follows_another(asked, &status),
+            };
+            match because.is_some() || status.verdict.is_none() && status.is_undriven() {
+                true => Err(not_shown(slave, Command::Start(direction), status, because)),
+                false => Ok(status),
             }
-            _ if follows_another(asked, &status).is_some() => {
-                let because = follows_another(asked, &status);
-                Err(not_shown(slave, Command::Start(direction), status, because))
-            }
-            None if status.is_undriven() => Err(not_shown(slave, Command::Start(direction), status, None)),
-            _ => Ok(status),
         }))
     }
 }
